@@ -1,0 +1,19 @@
+// The subcommands of `fathom`: each file adds its own to the program. A command throws fathom::Error; main turns that into exit 1.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace fathom::cli {
+
+void addInfo(CLI::App& app);
+void addConvert(CLI::App& app);
+void addCluster(CLI::App& app);
+void addTidyAndFlatten(CLI::App& app);
+void addDenoise(CLI::App& app);
+void addCompare(CLI::App& app);
+void addPng(CLI::App& app);
+
+// Thrown by a command that finished some of its work: its lines are printed, the exit status is 1.
+struct Incomplete {};
+
+}  // namespace fathom::cli

@@ -1,0 +1,7 @@
+#include "cli/commands.h"
+
+namespace fathom::cli {
+
+void addInfo(CLI::App&) {}
+
+}  // namespace fathom::cli

@@ -1,0 +1,7 @@
+#include "cli/commands.h"
+
+namespace fathom::cli {
+
+void addTidyAndFlatten(CLI::App&) {}
+
+}  // namespace fathom::cli

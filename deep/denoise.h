@@ -1,0 +1,69 @@
+// The deep denoiser: clean colours for every bin of a deep Monte Carlo render; bins, alphas and depths stay as they are.
+//
+// Source: Vicini et al., "Denoising Deep Monte Carlo Renderings", sections 4 and 5; the gate is Fathom's own (deep/gate).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "deep/image.h"
+#include "flat/progress.h"
+
+namespace fathom::deep {
+
+enum class Quality { Fast, Balanced, Best };
+
+// What of the channel convention a file offers. Decided once per sequence, so that frames do not differ in method.
+struct DenoiseInputs {
+  bool components = false;     // diffuse.* and specular.*; else R G B is the one component
+  bool halves = false;         // half0.* and half1.* of the components (or of R G B) with their sample counts
+  bool albedoHalves = false;   // half0.albedo.*, half1.albedo.*
+  bool variance = false;       // variance.{R,G,B}
+  bool counts = false;         // samples
+  bool albedo = false, albedoVariance = false;
+  bool normal = false, normalVariance = false;
+  bool depthVariance = false;
+  bool volumes = false;        // ZBack
+  int spp = 0;                 // fathom:spp; 0: unknown
+};
+
+DenoiseInputs findDenoiseInputs(std::span<const std::string> channels, const Attributes& attributes);
+
+// One line per thing that is missing and how it is estimated instead, for an artist; empty when all is there.
+std::vector<std::string> describeMissing(const DenoiseInputs& inputs);
+
+// Whether the denoiser reads a channel of this name, given what the file offers.
+bool denoiseReads(const DenoiseInputs& inputs, const std::string& channel);
+
+struct DenoiseParams {
+  Quality quality = Quality::Balanced;
+  bool gate = true;              // false: the paper's result
+  bool keepStatistics = false;   // keep half*, variance* and counts in the output, though they describe the noisy colours
+};
+
+struct DenoisePlan {
+  DenoiseInputs inputs;
+  DenoiseParams params;
+  float level = 0.5f;  // the mean colour of the first frame: absolute constants scale with it
+};
+
+// The mean of the flattened R, G and B over the pixels with alpha, from finite values; 0.5 where there is none.
+float meanLevel(const DeepImage& image);
+
+// How many rows above and below a row decide its result: bands need that much around them.
+int denoiseHalo(const DenoisePlan& plan);
+
+// What a run did: seconds by stage, and counts of what was processed, skipped and repaired, by name.
+struct DenoiseStats {
+  std::map<std::string, double> seconds;
+  std::map<std::string, uint64_t> counts;
+};
+
+// Takes an image of tidy bins (sorted, see `isTidy`) that follows DATA.md; returns it with R G B and the components filtered.
+// Alphas, depths, ids and channels it does not know pass unchanged. Throws Error (a channel missing) and Cancelled.
+DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress = {}, DenoiseStats* stats = nullptr);
+
+}  // namespace fathom::deep

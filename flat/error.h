@@ -1,0 +1,22 @@
+// The one kind of error that bad input, bad files and full disks raise: a line with values, shown as it is by `fathom`.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace fathom {
+
+// what() is one line without a final full stop, file first: "a.exr, part 1, channel Z: expected FLOAT, found UINT".
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+template <class... Args>
+[[noreturn]] void fail(fmt::format_string<Args...> text, Args&&... args) {
+  throw Error(fmt::format(text, std::forward<Args>(args)...));
+}
+
+}  // namespace fathom

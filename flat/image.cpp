@@ -1,0 +1,33 @@
+#include "flat/image.h"
+
+#include <algorithm>
+
+#include "flat/error.h"
+
+namespace fathom::flat {
+
+const Plane* Image::find(std::string_view name) const {
+  const auto it = std::find_if(planes.begin(), planes.end(), [&](const Plane& p) { return p.name == name; });
+  return it == planes.end() ? nullptr : &*it;
+}
+
+Plane* Image::find(std::string_view name) {
+  return const_cast<Plane*>(std::as_const(*this).find(name));
+}
+
+const Plane& Image::get(std::string_view name) const {
+  if (const Plane* plane = find(name)) return *plane;
+  fail("channel {}: expected in the image, found none", name);
+}
+
+Plane& Image::add(std::string name, float value) {
+  return planes.emplace_back(Plane{std::move(name), Buffer<float>(dataWindow.area(), value)});
+}
+
+Image Image::copy() const {
+  Image result{dataWindow, displayWindow, {}, attributes};
+  for (const Plane& plane : planes) result.planes.push_back({plane.name, plane.values.copy()});
+  return result;
+}
+
+}  // namespace fathom::flat
