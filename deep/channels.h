@@ -1,0 +1,32 @@
+// What a channel means when samples are composited, merged or split. The name decides (see the convention in the
+// README).
+#pragma once
+
+#include <string_view>
+
+#include "deep/image.h"
+
+namespace fathom::deep {
+
+enum class Role {
+  Depth,          // Z, ZBack
+  Alpha,          // A
+  Premultiplied,  // composited with `over`: colours, components, features, and every name not listed here
+  Plain,          // a coordinate of the sample, not premultiplied: averaged. coc, lens.*, time
+  Half,           // half0.*, half1.*: premultiplied means over a part of the sample's own camera samples
+  Statistic,      // variance.*, samples, half0.samples, half1.samples: composited nowhere
+  Identifier,     // type UINT, whatever its name
+};
+
+Role roleOf(std::string_view name, PixelType type);
+inline Role roleOf(const Channel& channel) {
+  return roleOf(channel.name, channel.type);
+}
+
+// True for what describes the camera samples of one sample or bin, and is void once that is merged with another or
+// split.
+inline bool describesSamples(Role role) {
+  return role == Role::Half || role == Role::Statistic;
+}
+
+}  // namespace fathom::deep
