@@ -1,0 +1,97 @@
+#include "tests/bench/measure.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "flat/error.h"
+
+namespace fathom::bench {
+namespace {
+
+double secondsOf(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// A line of /proc/self/status, in bytes.
+size_t statusBytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    size_t kilobytes = 0;
+    if (word == key && status >> kilobytes) return kilobytes * 1024;
+  }
+  fail("/proc/self/status: expected a line {}, found none", key);
+}
+
+std::string text(const Cell& cell) {
+  if (const auto* string = std::get_if<std::string>(&cell)) return *string;
+  return fmt::format("{:.3g}", std::get<double>(cell));
+}
+
+}  // namespace
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats) {
+  std::vector<std::vector<double>> seconds(cases.size());
+  for (const auto& run : cases) run();
+  for (int repeat = 0; repeat < repeats; ++repeat)
+    for (size_t i = 0; i < cases.size(); ++i) seconds[i].push_back(secondsOf(cases[i]));
+  std::vector<double> medians;
+  for (const auto& of : seconds) medians.push_back(median(of));
+  return medians;
+}
+
+size_t peakGrowth(const std::function<void()>& work) {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";  // the kernel starts the peak anew
+  const size_t before = statusBytes("VmRSS:");
+  work();
+  return std::max(statusBytes("VmHWM:"), before) - before;
+}
+
+void Table::print() const {
+  std::vector<size_t> widths;
+  for (size_t c = 0; c < columns_.size(); ++c) {
+    widths.push_back(columns_[c].size());
+    for (const auto& row : rows_) widths[c] = std::max(widths[c], text(row[c]).size());
+  }
+  fmt::print("\n{}\n\n", title_);
+  const auto line = [&](auto&& cell) {
+    for (size_t c = 0; c < columns_.size(); ++c) fmt::print("{}{:<{}}", c == 0 ? "| " : " | ", cell(c), widths[c]);
+    fmt::print(" |\n");
+  };
+  line([&](size_t c) { return columns_[c]; });
+  line([&](size_t c) { return std::string(widths[c], '-'); });
+  for (const auto& row : rows_) line([&](size_t c) { return text(row[c]); });
+  std::fflush(stdout);
+}
+
+void writeJson(const std::string& path, const std::vector<Table>& tables) {
+  nlohmann::ordered_json json;
+  for (const Table& table : tables) {
+    auto& rows = json[table.title()] = nlohmann::ordered_json::array();
+    for (const auto& row : table.rows()) {
+      nlohmann::ordered_json object;
+      for (size_t c = 0; c < row.size(); ++c)
+        std::visit([&](const auto& value) { object[table.columns()[c]] = value; }, row[c]);
+      rows.push_back(std::move(object));
+    }
+  }
+  std::ofstream out(path);
+  out << json.dump(2) << '\n';
+  if (!out.flush()) fail("{}: cannot be written", path);
+}
+
+}  // namespace fathom::bench

@@ -1,0 +1,44 @@
+// What every benchmark needs: interleaved timings, peak memory, and a table that is printed and kept as JSON.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace fathom::bench {
+
+// Runs every case once unmeasured, then all of them in turn `repeats` times, so that a slow moment of the machine
+// falls on all alike; returns the median seconds of each.
+std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats);
+
+double median(std::vector<double> values);
+
+// How many bytes the process grew by at most while `work` ran (resident set; Linux keeps its peak).
+size_t peakGrowth(const std::function<void()>& work);
+
+using Cell = std::variant<std::string, double>;
+
+// Columns carry their unit in their name ("s/MP"); doubles are printed with three significant digits.
+class Table {
+ public:
+  Table(std::string title, std::vector<std::string> columns) : title_(std::move(title)), columns_(std::move(columns)) {}
+
+  void add(std::vector<Cell> row) { rows_.push_back(std::move(row)); }
+  void print() const;
+
+  const std::string& title() const { return title_; }
+  const std::vector<std::string>& columns() const { return columns_; }
+  const std::vector<std::vector<Cell>>& rows() const { return rows_; }
+
+ private:
+  std::string title_;
+  std::vector<std::string> columns_;
+  std::vector<std::vector<Cell>> rows_;
+};
+
+// All tables of a benchmark: {"title": [{"column": value, ...}, ...], ...}.
+void writeJson(const std::string& path, const std::vector<Table>& tables);
+
+}  // namespace fathom::bench
