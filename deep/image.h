@@ -1,7 +1,8 @@
 // A deep image: per pixel any number of samples, per sample one value in each channel.
 //
-// Samples lie in pixel order (rows from the top), within a pixel in the file's order; `tidy`, `cluster` and `sortSamples`
-// make it front to back. The samples of neighbouring pixels of a row are neighbours in memory: kernels feed on that.
+// Samples lie in pixel order (rows from the top), within a pixel in the file's order; `tidy`, `cluster` and
+// `sortSamples` make it front to back. The samples of neighbouring pixels of a row are neighbours in memory: kernels
+// feed on that.
 #pragma once
 
 #include <cstdint>

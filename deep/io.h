@@ -1,7 +1,7 @@
 // Deep EXR files in and out, on OpenEXR's C++ library: deep scanlines and deep tiles (level 0), single and multi-part.
 //
-// Errors (fathom::Error) name the file, the part, the channel, what was expected and what was found. Any bytes as input end in
-// an image or an Error; memory is checked against the limit before anything is allocated.
+// Errors (fathom::Error) name the file, the part, the channel, what was expected and what was found. Any bytes as input
+// end in an image or an Error; memory is checked against the limit before anything is allocated.
 #pragma once
 
 #include <functional>
@@ -42,8 +42,8 @@ std::vector<PartInfo> readParts(const std::string& path);
 using ChannelFilter = std::function<bool(const std::string& name)>;
 
 struct ReadOptions {
-  std::string part;                    // number or name; empty: the first deep part
-  ChannelFilter channels;              // only these are unpacked
+  std::string part;                      // number or name; empty: the first deep part
+  ChannelFilter channels;                // only these are unpacked
   size_t memoryLimit = size_t(8) << 30;  // bytes that one decoded image or band may take
 };
 
@@ -76,8 +76,8 @@ struct WriteOptions {
   int replacedPart = 0;
 };
 
-// Writes rows in order, in bands; the file stands at `path` only after finish(). Until then it is `path` + a temporary suffix in
-// the same folder, which the destructor removes.
+// Writes rows in order, in bands; the file stands at `path` only after finish(). Until then it is `path` + a temporary
+// suffix in the same folder, which the destructor removes.
 class Writer {
  public:
   // `layout` gives windows, attributes, channel names and types (its samples are not read).
