@@ -17,7 +17,7 @@ constexpr double kWidth = 640, kHeight = 400, kLeft = 70, kRight = 100, kTop = 2
 struct Axis {
   double low, high, from, to;
 
-  Axis(std::vector<double> values, double from, double to) : from(from), to(to) {
+  Axis(const std::vector<double>& values, double first, double last) : from(first), to(last) {
     const auto [least, most] = std::minmax_element(values.begin(), values.end());
     low = *least / 1.5;
     high = *most * 1.5;
