@@ -2,122 +2,134 @@
 // that.
 #include "deep/flatten.h"
 
-#include <OpenEXR/ImfFloatAttribute.h>
-#include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIntAttribute.h>
-#include <OpenEXR/ImfMatrixAttribute.h>
-#include <OpenEXR/ImfStringAttribute.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <limits>
 #include <vector>
 
 #include "deep/channels.h"
-#include "deep/volume.h"
+#include "deep/flat_attributes.h"
+#include "deep/pixel_pieces.h"
 #include "flat/parallel.h"
 
 namespace fathom::deep {
 
 namespace {
 
-struct Contribution {
-  size_t sample;
-  double premultiplied;  // factor of premultiplied values: the transmittance in front of the sample
-  double plain;          // factor of other values: the sample's part of the pixel's alpha
+// How one row's pixels are made of its samples.
+struct RowWeights {
+  std::vector<double> premultiplied;  // per sample, the factor of premultiplied values
+  std::vector<double> plain;          // per sample, the factor of other values: its part of what is seen of the pixel
+  std::vector<float> alpha, z;        // per pixel
 };
 
-struct RowGeometry {
-  std::vector<Contribution> contributions;
-  std::vector<size_t> first;  // per pixel, its first contribution; one more at the end
-  std::vector<float> alpha, z;
-};
-
-float middle(float z, float zBack) {
-  return zBack > z && std::isfinite(zBack) ? float((double(z) + double(zBack)) / 2) : z;
-}
-
-// One pixel appended to the row.
-void decide(const DeepImage& image, std::span<const float> alpha, std::span<const float> z,
-            std::span<const float> zBack, size_t pixel, RowGeometry& row) {
-  const size_t first = row.contributions.size();
-  double passed = 1, opaque = 0, depth = 0;
+// What compositing pieces front to back adds up.
+struct Pixel {
+  double passed = 1;  // transmittance so far
+  double alpha = 0;
+  double depth = 0, depthAlpha = 0;  // of the pieces at a finite depth
   float nearest = std::numeric_limits<float>::infinity();
-  for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i) {
-    const double a = opacity(alpha[i]);
-    const float mid = zBack.empty() ? z[i] : middle(z[i], zBack[i]);
-    nearest = std::min(nearest, z[i]);
-    opaque += passed * a;
-    if (a > 0 && passed > 0) depth += passed * a * double(mid);
-    row.contributions.push_back({i, passed, passed * a});
-    passed *= 1 - a;
+
+  // Returns the transmittance in front of the piece.
+  double put(const Range& range, double pieceAlpha) {
+    const double front = passed, seen = front * pieceAlpha, middle = range.middle();
+    nearest = std::min(nearest, range.z);
+    alpha += seen;
+    if (std::isfinite(middle)) {
+      depth += seen * middle;
+      depthAlpha += seen;
+    }
+    passed *= 1 - pieceAlpha;
+    return front;
   }
-  for (size_t k = first; k < row.contributions.size(); ++k)
-    row.contributions[k].plain = opaque > 0 ? row.contributions[k].plain / opaque : 0;
-  row.first.push_back(row.contributions.size());
-  row.alpha.push_back(float(opaque));
-  row.z.push_back(row.contributions.size() == first ? 0.0f : opaque > 0 ? float(depth / opaque) : nearest);
+  float z() const { return depthAlpha > 0 ? float(depth / depthAlpha) : nearest; }
+};
+
+struct Source {
+  const DeepImage& image;
+  std::span<const float> alpha, z, zBack;
+  bool mergePoints;
+
+  std::span<const float> of(std::span<const float> values, size_t pixel) const {
+    return values.empty() ? values : values.subspan(image.offsets[pixel], image.count(pixel));
+  }
+};
+
+// Composites the pixel whose samples start at `first` in the row.
+void decide(const Source& source, size_t pixel, size_t first, PixelPieces& pieces, RowWeights& row) {
+  const std::span<const float> alpha = source.of(source.alpha, pixel);
+  pieces.set(source.of(source.z, pixel), source.of(source.zBack, pixel));
+  checkOverlaps(pieces.size(source.mergePoints), source.image.dataWindow, pixel);
+  Pixel sum;
+  pieces.visit(alpha, source.mergePoints, [&](const Piece& piece) {
+    const double front = sum.put(piece.range, piece.alpha);
+    for (const Share& share : piece.shares) {
+      row.premultiplied[first + share.sample] += front * share.weight;
+      row.plain[first + share.sample] += front * piece.alpha * share.part;
+    }
+  });
+  for (size_t i = first; i < first + alpha.size(); ++i) row.plain[i] = sum.alpha > 0 ? row.plain[i] / sum.alpha : 0;
+  row.alpha.push_back(float(sum.alpha));
+  row.z.push_back(alpha.empty() ? 0 : sum.z());
 }
 
-template <double Contribution::*factor>
-void apply(const RowGeometry& row, std::span<const float> values, std::span<float> out) {
+RowWeights decideRow(const Source& source, size_t firstPixel, size_t endPixel) {
+  const DeepImage& image = source.image;
+  const size_t begin = image.offsets[firstPixel], samples = image.offsets[endPixel] - begin;
+  RowWeights row{std::vector<double>(samples), std::vector<double>(samples), {}, {}};
+  PixelPieces pieces;
+  for (size_t pixel = firstPixel; pixel < endPixel; ++pixel)
+    decide(source, pixel, image.offsets[pixel] - begin, pieces, row);
+  return row;
+}
+
+// `offsets` are those of the row's pixels.
+void apply(const std::vector<double>& weights, const uint64_t* offsets, std::span<const float> values,
+           std::span<float> out) {
   for (size_t x = 0; x < out.size(); ++x) {
     double sum = 0;
-    for (size_t k = row.first[x]; k < row.first[x + 1]; ++k)
-      sum += row.contributions[k].*factor * double(finiteOrZero(values[row.contributions[k].sample]));
+    for (size_t i = offsets[x]; i < offsets[x + 1]; ++i)
+      sum += weights[i - offsets[0]] * double(finiteOrZero(values[i]));
     out[x] = float(sum);
   }
 }
 
-std::map<std::string, std::string> flatAttributes(const Attributes& attributes) {
-  std::map<std::string, std::string> result;
-  const auto& header = attributes.header();
-  for (auto it = header.begin(); it != header.end(); ++it) {
-    const Imf::Attribute& a = it.attribute();
-    if (const auto* i = dynamic_cast<const Imf::IntAttribute*>(&a)) result[it.name()] = fmt::format("{}", i->value());
-    if (const auto* f = dynamic_cast<const Imf::FloatAttribute*>(&a)) result[it.name()] = fmt::format("{}", f->value());
-    if (const auto* s = dynamic_cast<const Imf::StringAttribute*>(&a)) result[it.name()] = s->value();
-    if (const auto* m = dynamic_cast<const Imf::M44fAttribute*>(&a)) {
-      const float* v = m->value().getValue();
-      result[it.name()] = fmt::format("{}", fmt::join(v, v + 16, ", "));
-    }
-  }
-  for (const char* stale : {"name", "type"}) result.erase(stale);
-  return result;
+bool hasFlatForm(const Channel& channel) {
+  const Role role = roleOf(channel);
+  return role != Role::Statistic && role != Role::Identifier && channel.name != "ZBack";
+}
+
+// Samples of camera rays: their alphas count rays, so merging two at the same depth would change what each stands for.
+bool holdsStatistics(const DeepImage& image) {
+  return image.attributes.getInt("fathom:spp") ||
+         std::any_of(image.channels.begin(), image.channels.end(),
+                     [](const Channel& c) { return describesSamples(roleOf(c)); });
 }
 
 }  // namespace
 
 flat::Image flatten(const DeepImage& image) {
-  const std::span<const float> alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");
+  const Source source{image, image.get("A"), image.get("Z"), image.tryGet("ZBack"), !holdsStatistics(image)};
   flat::Image result{image.dataWindow, image.displayWindow, {}, flatAttributes(image.attributes)};
-  std::vector<const Channel*> sources;
-  for (const Channel& channel : image.channels) {
-    const Role role = roleOf(channel);
-    if (role == Role::Statistic || role == Role::Identifier || channel.name == "ZBack") continue;
-    sources.push_back(&channel);
-    result.add(channel.name);
-  }
+  std::vector<const Channel*> channels;
+  for (const Channel& channel : image.channels)
+    if (hasFlatForm(channel)) {
+      channels.push_back(&channel);
+      result.add(channel.name);
+    }
   const size_t width = size_t(image.dataWindow.width());
   parallelFor(0, image.dataWindow.height(), [&](int y) {
-    RowGeometry row;
-    row.first.push_back(0);
-    for (size_t x = 0; x < width; ++x) decide(image, alpha, z, zBack, size_t(y) * width + x, row);
-    for (size_t c = 0; c < sources.size(); ++c) {
-      const std::span<float> out{result.planes[c].values.data() + size_t(y) * width, width};
-      switch (roleOf(*sources[c])) {
-        case Role::Alpha:
-          std::copy(row.alpha.begin(), row.alpha.end(), out.begin());
-          break;
-        case Role::Depth:
-          std::copy(row.z.begin(), row.z.end(), out.begin());
-          break;
-        case Role::Plain:
-          apply<&Contribution::plain>(row, sources[c]->values, out);
-          break;
-        default:
-          apply<&Contribution::premultiplied>(row, sources[c]->values, out);
-      }
+    const size_t first = size_t(y) * width;
+    const RowWeights row = decideRow(source, first, first + width);
+    for (size_t c = 0; c < channels.size(); ++c) {
+      const std::span<float> out{result.planes[c].values.data() + first, width};
+      const Role role = roleOf(*channels[c]);
+      if (role == Role::Alpha)
+        std::copy(row.alpha.begin(), row.alpha.end(), out.begin());
+      else if (role == Role::Depth)
+        std::copy(row.z.begin(), row.z.end(), out.begin());
+      else
+        apply(role == Role::Plain ? row.plain : row.premultiplied, image.offsets.data() + first, channels[c]->values,
+              out);
     }
   });
   return result;

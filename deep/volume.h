@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 
 namespace fathom::deep {
 
@@ -18,5 +19,36 @@ inline double opacity(float alpha) {
 inline float finiteOrZero(float value) {
   return std::abs(value) <= 1e15f ? value : 0.0f;
 }
+
+// Depths as compositing takes them. A range that is not finite or not positive in length is a point at `z`; a depth
+// that is not a number is a point behind everything.
+struct Range {
+  float z, zBack;  // z == zBack: a point
+
+  bool isPoint() const { return z == zBack; }
+  double middle() const { return isPoint() ? double(z) : (double(z) + double(zBack)) / 2; }
+  bool operator==(const Range&) const = default;
+};
+Range usableRange(float z, float zBack);
+
+// A part of a volume: its alpha, and the factor between the whole's premultiplied values and the part's.
+struct Part {
+  double alpha, weight;
+};
+
+// The part of a volume of `alpha` that is `fraction` of its length. Parts of fractions that sum to 1, front over back,
+// give the volume again.
+Part partOf(double alpha, double fraction);
+
+// What coincident samples become together.
+struct Merged {
+  double alpha;
+  size_t largest;  // which of them has the largest share; the first where several have
+};
+
+// Merges samples that cover the same depths. `weights` receives the factors of their premultiplied values, whose sum is
+// the merged sample's; `shares` receives what part of its opacity each one makes up (sum 1). All spans have the same
+// size, at least 1.
+Merged merge(std::span<const double> alphas, std::span<double> weights, std::span<double> shares);
 
 }  // namespace fathom::deep

@@ -1,0 +1,143 @@
+#include "deep/pixel_pieces.h"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+
+#include "flat/error.h"
+
+namespace fathom::deep {
+
+namespace {
+
+// Of samples in order.
+Untidiness overlapsOf(std::span<const Range> ranges, std::span<const size_t> order) {
+  Untidiness result;
+  const Range* before = nullptr;
+  float end = -std::numeric_limits<float>::infinity();  // of the volumes so far
+  for (const size_t sample : order) {
+    const Range& range = ranges[sample];
+    if (range.isPoint() && before && *before == range) result.pointsCoincide = true;
+    if (range.z < end) result.volumesOverlap = true;
+    if (!range.isPoint()) end = std::max(end, range.zBack);
+    before = &range;
+  }
+  return result;
+}
+
+}  // namespace
+
+Untidiness& Untidiness::operator|=(const Untidiness& other) {
+  unsorted |= other.unsorted;
+  pointsCoincide |= other.pointsCoincide;
+  volumesOverlap |= other.volumesOverlap;
+  return *this;
+}
+
+void PixelPieces::set(std::span<const float> z, std::span<const float> zBack) {
+  ranges_.resize(z.size());
+  bool repaired = false;
+  for (size_t i = 0; i < z.size(); ++i) {
+    const Range given{z[i], zBack.empty() ? z[i] : zBack[i]};
+    ranges_[i] = usableRange(given.z, given.zBack);
+    repaired |= !(ranges_[i] == given);
+  }
+  order_.resize(z.size());
+  std::iota(order_.begin(), order_.end(), size_t(0));
+  const auto front = [&](size_t a, size_t b) {
+    return std::tie(ranges_[a].z, ranges_[a].zBack, a) < std::tie(ranges_[b].z, ranges_[b].zBack, b);
+  };
+  const bool sorted = std::is_sorted(order_.begin(), order_.end(), front);
+  if (!sorted) std::sort(order_.begin(), order_.end(), front);
+  untidiness_ = overlapsOf(ranges_, order_);
+  untidiness_.unsorted = !sorted || repaired;
+}
+
+void PixelPieces::findCuts() {
+  cuts_.clear();
+  for (const Range& range : ranges_) {
+    cuts_.push_back(range.z);
+    if (!range.isPoint()) cuts_.push_back(range.zBack);
+  }
+  std::sort(cuts_.begin(), cuts_.end());
+  cuts_.erase(std::unique(cuts_.begin(), cuts_.end()), cuts_.end());
+}
+
+PixelPieces::Size PixelPieces::size(bool mergePoints) {
+  if (!untidiness_.any()) return {order_.size(), order_.size()};
+  findCuts();
+  const auto cut = [&](float z) { return size_t(std::lower_bound(cuts_.begin(), cuts_.end(), z) - cuts_.begin()); };
+  Size size;
+  size_t covered = 0;  // intervals before this cut have been counted
+  const Range* before = nullptr;
+  for (const size_t sample : order_) {
+    const Range& range = ranges_[sample];
+    if (range.isPoint()) {
+      ++size.shares;
+      if (!mergePoints || !before || !(*before == range)) ++size.pieces;
+    } else {
+      const size_t first = cut(range.z), last = cut(range.zBack);
+      size.shares += last - first;
+      size.pieces += last - std::clamp(covered, first, last);
+      covered = std::max(covered, last);
+    }
+    before = &range;
+  }
+  return size;
+}
+
+Piece PixelPieces::meet(std::span<const size_t> samples, Range range, std::span<const float> alpha) {
+  shares_.clear();
+  alphas_.clear();
+  for (const size_t sample : samples) {
+    const Range& whole = ranges_[sample];
+    const double a = opacity(alpha[sample]);
+    const double length = double(range.zBack) - double(range.z);
+    const Part part = whole == range ? Part{a, 1} : partOf(a, length / (double(whole.zBack) - double(whole.z)));
+    shares_.push_back({sample, part.weight, 1});
+    alphas_.push_back(part.alpha);
+  }
+  const bool whole = samples.size() == 1 && ranges_[samples[0]] == range;
+  if (samples.size() == 1) return {range, alphas_[0], samples[0], whole, shares_};
+  weights_.resize(samples.size());
+  parts_.resize(samples.size());
+  const Merged merged = merge(alphas_, weights_, parts_);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    shares_[i].weight *= weights_[i];
+    shares_[i].part = parts_[i];
+  }
+  return {range, merged.alpha, samples[merged.largest], whole, shares_};
+}
+
+void PixelPieces::visit(std::span<const float> alpha, bool mergePoints,
+                        const std::function<void(const Piece&)>& visit) {
+  if (!untidiness_.any()) {
+    for (const size_t& sample : order_) visit(meet({&sample, 1}, ranges_[sample], alpha));
+    return;
+  }
+  findCuts();
+  active_.clear();
+  size_t next = 0;
+  const auto startsAt = [&](float z) { return next < order_.size() && ranges_[order_[next]].z == z; };
+  for (size_t k = 0; k < cuts_.size(); ++k) {
+    const float z = cuts_[k];
+    std::erase_if(active_, [&](size_t sample) { return ranges_[sample].zBack <= z; });
+    const size_t first = next;
+    while (startsAt(z) && ranges_[order_[next]].isPoint()) ++next;
+    const std::span<const size_t> points = order().subspan(first, next - first);
+    if (mergePoints && !points.empty()) visit(meet(points, {z, z}, alpha));
+    for (size_t i = 0; !mergePoints && i < points.size(); ++i) visit(meet(points.subspan(i, 1), {z, z}, alpha));
+    while (startsAt(z)) active_.push_back(order_[next++]);
+    if (!active_.empty()) visit(meet(active_, {z, cuts_[k + 1]}, alpha));
+  }
+}
+
+void checkOverlaps(PixelPieces::Size size, const Box& dataWindow, size_t pixel) {
+  constexpr size_t kMost = 100'000'000;
+  const size_t width = size_t(dataWindow.width());
+  if (size.shares > kMost)
+    fail("pixel ({}, {}): expected overlapping volumes that make at most {} pieces, found {}",
+         dataWindow.x0 + int(pixel % width), dataWindow.y0 + int(pixel / width), kMost, size.shares);
+}
+
+}  // namespace fathom::deep
