@@ -1,4 +1,5 @@
-// The subcommands of `fathom`: each file adds its own to the program. A command throws fathom::Error; main turns that into exit 1.
+// The subcommands of `fathom`: each file adds its own to the program. A command throws fathom::Error; main turns that
+// into exit 1.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,6 +13,9 @@ void addTidyAndFlatten(CLI::App& app);
 void addDenoise(CLI::App& app);
 void addCompare(CLI::App& app);
 void addPng(CLI::App& app);
+
+// The exit status of a command that was told to stop.
+constexpr int kInterrupted = 130;
 
 // Thrown by a command that finished some of its work: its lines are printed, the exit status is 1.
 struct Incomplete {};

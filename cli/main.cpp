@@ -7,6 +7,7 @@
 
 #include "cli/commands.h"
 #include "flat/error.h"
+#include "flat/progress.h"
 
 namespace {
 
@@ -33,6 +34,9 @@ int main(int argc, char** argv) {
     return run(argc, argv);
   } catch (const fathom::cli::Incomplete&) {
     return kFailed;
+  } catch (const fathom::Cancelled&) {
+    fmt::print(stderr, "fathom: stopped\n");
+    return fathom::cli::kInterrupted;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "fathom: out of memory\n");
   } catch (const std::exception& e) {

@@ -1,0 +1,302 @@
+// Three stages, one chunk in each: a chunk is a frame, or a band of its rows where the frame does not fit the memory.
+// Bands overlap by the rows that decide a result, so that the bits do not depend on them.
+#include "cli/denoise_sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <new>
+#include <optional>
+#include <set>
+
+#include "cli/content_hash.h"
+#include "flat/error.h"
+#include "flat/progress.h"
+
+namespace fathom::cli {
+
+namespace {
+
+// The decoded chunk and the denoiser's scratch are 4 times the chunk; the next one is read and the last one written.
+constexpr size_t kChunksInMemory = 6;
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// What went wrong, in one line that names the frame's input where it does not begin with one of its files.
+std::string describeError(const DenoiseFrame& frame) {
+  try {
+    throw;
+  } catch (const Error& e) {
+    const std::string text = e.what();
+    std::vector<std::string> files = frame.inputs.files();
+    for (const std::string& file : frame.outputs.files()) files.push_back(file);
+    const bool named =
+        std::any_of(files.begin(), files.end(), [&](const std::string& file) { return text.starts_with(file); });
+    return named ? text : fmt::format("{}: {}", frame.inputs.main, text);
+  } catch (const std::bad_alloc&) {
+    return fmt::format("{}: out of memory", frame.inputs.main);
+  } catch (const std::exception& e) {
+    return fmt::format("{}: {}", frame.inputs.main, oneLine(e.what()));
+  }
+}
+
+struct Band {
+  int y0, y1;
+};
+
+struct Chunk {
+  size_t frame = 0;
+  std::shared_ptr<const FrameOrigin> origin;
+  Band band{0, 0};
+  bool last = true;       // of its frame
+  deep::DeepImage image;  // the band with the rows around it that decide it; then the band denoised
+  bool kept = false;      // nothing to do: the outputs are there
+  std::string error;      // the frame cannot be read
+  double seconds = 0;     // of the stage that it comes from
+  std::set<std::string> notes;
+};
+
+// The bands whose rows, with `halo` more on both sides, take at most `budget` bytes.
+std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
+  const Box& window = source.part().dataWindow;
+  if (source.decodedBytes(window.y0, window.y1) <= budget) return {{window.y0, window.y1}};
+  std::vector<size_t> upTo = {0};
+  for (int y = window.y0; y < window.y1; ++y) upTo.push_back(upTo.back() + source.decodedBytes(y, y + 1));
+  const auto bytes = [&](int y0, int y1) {
+    return upTo[size_t(std::min(y1 + halo, window.y1) - window.y0)] -
+           upTo[size_t(std::max(y0 - halo, window.y0) - window.y0)];
+  };
+  std::vector<Band> bands;
+  for (int y0 = window.y0; y0 < window.y1;) {
+    int y1 = y0 + 1;
+    if (bytes(y0, y1) > budget)
+      fail("{}: expected at least {} MB of memory for rows {} to {}, found a limit of {} MB", source.path(),
+           bytes(y0, y1) * kChunksInMemory / 1'000'000 + 1, y0 - halo, y1 + halo, budget * kChunksInMemory / 1'000'000);
+    while (y1 < window.y1 && bytes(y0, y1 + 1) <= budget) ++y1;
+    bands.push_back({y0, y1});
+    y0 = y1;
+  }
+  return bands;
+}
+
+// The first stage: checks what is there already, and reads.
+class ChunkReader {
+ public:
+  explicit ChunkReader(const DenoiseJob& job) : job_(job), halo_(deep::denoiseHalo(job.plan.denoise)) {}
+
+  // The next chunk, or nothing after the last one.
+  std::optional<Chunk> next() {
+    const Stopwatch watch;
+    if (!source_ && frame_ == job_.frames.size()) return {};
+    Chunk chunk;
+    chunk.frame = frame_;
+    try {
+      if (!source_ && !open()) {
+        chunk.kept = true;
+      } else {
+        const Box& window = source_->part().dataWindow;
+        chunk.origin = origin_;
+        chunk.band = bands_[band_++];
+        chunk.image = source_->read(std::max(chunk.band.y0 - halo_, window.y0),
+                                    std::min(chunk.band.y1 + halo_, window.y1), chunk.notes);
+        chunk.last = band_ == bands_.size();
+      }
+    } catch (const std::exception&) {
+      chunk.error = describeError(job_.frames[frame_]);
+      chunk.last = true;
+    }
+    if (chunk.last) close();
+    chunk.seconds = watch.seconds();
+    return chunk;
+  }
+
+ private:
+  // False where the outputs are there already.
+  bool open() {
+    const DenoiseFrame& frame = job_.frames[frame_];
+    ContentHash hash;
+    for (const std::string& text : {std::string(FATHOM_VERSION), job_.settings, describePlan(job_.plan.denoise)})
+      hash.add(text);
+    for (const std::string& file : frame.inputs.files()) hash.addFile(file);
+    const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
+    if (isDone(frame.outputs, madeBy)) return false;
+
+    source_.emplace(frame.inputs, job_.source);
+    if (source_->deep() != job_.plan.deep)
+      fail("{}: expected a {} file like the sequence's first", frame.inputs.main, job_.plan.deep ? "deep" : "flat");
+    source_->want([this](const std::string& name) { return isWanted(job_.plan.denoise, name); });
+    bands_ = cutBands(*source_, halo_, job_.memory / kChunksInMemory);
+    origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
+                                                        source_->part().dataWindow, source_->flatAttributes(), madeBy});
+    return true;
+  }
+
+  bool isDone(const FrameOutputs& outputs, const std::string& madeBy) const {
+    bool done = true;
+    for (const std::string& file : outputs.files()) {
+      const Standing standing = standingOf(file, madeBy);
+      if (standing == Standing::Other && !job_.overwrite)
+        fail(
+            "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "
+            "replaces it)",
+            file);
+      done = done && standing == Standing::Ours;
+    }
+    return done;
+  }
+
+  void close() {
+    source_.reset();
+    bands_.clear();
+    band_ = 0;
+    ++frame_;
+  }
+
+  const DenoiseJob& job_;
+  const int halo_;
+  size_t frame_ = 0, band_ = 0;
+  std::optional<FrameSource> source_;
+  std::vector<Band> bands_;
+  std::shared_ptr<const FrameOrigin> origin_;
+};
+
+// The last stage. Returns the chunk without its image.
+class ChunkWriter {
+ public:
+  explicit ChunkWriter(const DenoiseJob& job) : job_(job) {}
+
+  Chunk write(Chunk chunk) {
+    const Stopwatch watch;
+    try {
+      if (!sink_) sink_.emplace(job_.frames[chunk.frame].outputs, *chunk.origin);
+      sink_->write(std::move(chunk.image));
+      if (chunk.last) sink_->finish();
+    } catch (const std::exception&) {
+      chunk.error = describeError(job_.frames[chunk.frame]);
+    }
+    if (chunk.last || !chunk.error.empty()) drop();
+    chunk.image = {};
+    chunk.seconds = watch.seconds();
+    return chunk;
+  }
+
+  // Forgets a frame that is not complete.
+  void drop() { sink_.reset(); }
+
+ private:
+  const DenoiseJob& job_;
+  std::optional<FrameSink> sink_;
+};
+
+// The stages together, and what is told of them.
+class SequenceRun {
+ public:
+  SequenceRun(const DenoiseJob& job, ProgressDisplay& display, const std::stop_token& stop)
+      : job_(job), display_(display), stop_(stop), reader_(job), writer_(job), reports_(job.frames.size()) {}
+
+  std::vector<FrameReport> run() {
+    const std::launch launch = job_.overlap ? std::launch::async : std::launch::deferred;
+    std::future<std::optional<Chunk>> reading = std::async(launch, [this] { return reader_.next(); });
+    while (std::optional<Chunk> chunk = reading.get()) {
+      if (stop_.stop_requested()) throw Cancelled();
+      reading = std::async(launch, [this] { return reader_.next(); });
+      if (!process(*chunk)) continue;
+      finishWriting();
+      if (!reports_[chunk->frame].error.empty()) continue;  // an earlier band could not be written
+      writing_ =
+          std::async(launch, [this, work = std::move(*chunk)]() mutable { return writer_.write(std::move(work)); });
+      if (!job_.overlap) finishWriting();
+    }
+    finishWriting();
+    return std::move(reports_);
+  }
+
+ private:
+  // True where the chunk goes on to be written.
+  bool process(Chunk& chunk) {
+    FrameReport& report = reports_[chunk.frame];
+    for (const std::string& note : chunk.notes)
+      if (notes_.insert(note).second) display_.tell(note);
+    if (!report.error.empty()) return false;  // an earlier band failed
+    report.stats.seconds["read"] += chunk.seconds;
+    ++report.bands;
+    if (chunk.error.empty() && !chunk.kept) denoise(chunk, report);
+    if (chunk.kept) {
+      report.status = FrameReport::Status::Kept;
+      display_.frameDone(fmt::format("{}: done before", job_.frames[chunk.frame].outputs.image));
+    } else if (!chunk.error.empty()) {
+      finishWriting();  // an earlier band of the same frame may be in it
+      writer_.drop();
+      failed(chunk);
+    }
+    return !chunk.kept && report.error.empty();
+  }
+
+  void denoise(Chunk& chunk, FrameReport& report) {
+    const Box& window = chunk.origin->dataWindow;
+    const double height = std::max(1, window.height());
+    const Progress progress{
+        [&](double done) {
+          display_.at((chunk.band.y0 - window.y0 + done * (chunk.band.y1 - chunk.band.y0)) / height);
+        },
+        stop_};
+    try {
+      chunk.image = deep::denoise(std::move(chunk.image), job_.plan.denoise, progress, &report.stats);
+      const Box& around = chunk.image.dataWindow;
+      if (around.y0 != chunk.band.y0 || around.y1 != chunk.band.y1)
+        chunk.image = deep::rows(chunk.image, chunk.band.y0, chunk.band.y1);
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const std::exception&) {
+      chunk.error = describeError(job_.frames[chunk.frame]);
+    }
+  }
+
+  void finishWriting() {
+    if (!writing_.valid()) return;
+    const Chunk chunk = writing_.get();
+    FrameReport& report = reports_[chunk.frame];
+    report.stats.seconds["write"] += chunk.seconds;
+    if (!chunk.error.empty()) return failed(chunk);
+    if (!chunk.last) return;
+    double seconds = 0;
+    for (const auto& [stage, time] : report.stats.seconds) seconds += time;
+    if (const auto found = report.stats.counts.find("non-finite samples");
+        found != report.stats.counts.end() && found->second > 0)
+      display_.tell(fmt::format("{}: {} samples without a finite colour got the filtered one",
+                                job_.frames[chunk.frame].inputs.main, found->second));
+    display_.frameDone(fmt::format("{}: {:.1f} s", job_.frames[chunk.frame].outputs.image, seconds));
+  }
+
+  void failed(const Chunk& chunk) {
+    reports_[chunk.frame].status = FrameReport::Status::Failed;
+    reports_[chunk.frame].error = chunk.error;
+    display_.tell("fathom: " + chunk.error);
+    display_.frameDone("");
+  }
+
+  const DenoiseJob& job_;
+  ProgressDisplay& display_;
+  const std::stop_token stop_;
+  ChunkReader reader_;
+  ChunkWriter writer_;
+  std::vector<FrameReport> reports_;
+  std::set<std::string> notes_;
+  std::future<Chunk> writing_;  // last: its destructor waits for the writer
+};
+
+}  // namespace
+
+std::vector<FrameReport> denoiseSequence(const DenoiseJob& job, ProgressDisplay& display, const std::stop_token& stop) {
+  return SequenceRun(job, display, stop).run();
+}
+
+}  // namespace fathom::cli
