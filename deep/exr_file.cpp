@@ -108,15 +108,15 @@ bool checkHeader(HeaderStream& stream, const InputFile& file) {
     const int size = readInt(stream);
     const uint64_t at = stream.tellg();
     if (size < 0 || uint64_t(size) > file.size() - at)
-      fail("{}: attribute {}: expected a size of at most {} bytes, found {}", file.path(), name, file.size() - at,
-           uint32_t(size));
+      fail("{}: attribute {}: expected a size of at most {} bytes, found {}", file.path(), printable(name),
+           file.size() - at, uint32_t(size));
     if (type == "stringvector") {
       for (uint64_t used = 0; used < uint64_t(size);) {
         const int length = readInt(stream);
         used += 4;
         if (length < 0 || used + uint64_t(length) > uint64_t(size))
-          fail("{}: attribute {}: expected strings within {} bytes, found one of {}", file.path(), name, size,
-               uint32_t(length));
+          fail("{}: attribute {}: expected strings within {} bytes, found one of {}", file.path(), printable(name),
+               size, uint32_t(length));
         used += uint64_t(length);
         stream.seekg(at + used);
       }
@@ -244,7 +244,9 @@ ExrFile::ExrFile(const std::string& path) : file_(path) {
   } catch (const Error&) {
     throw;
   } catch (const std::exception& e) {
-    fail("{}: header: {}", path, e.what());
+    std::string what = printable(e.what());
+    if (what.ends_with('.')) what.pop_back();
+    fail("{}: header: {}", path, what);
   }
 }
 
@@ -271,7 +273,8 @@ void ExrFile::readHeaders() {
 
 std::string ExrFile::where(const PartInfo& part) const {
   if (!multiPart_) return file_.path();
-  return fmt::format("{}, part {}{}", file_.path(), part.number, part.name.empty() ? "" : " (" + part.name + ")");
+  const std::string name = part.name.empty() ? "" : " (" + printable(part.name) + ")";
+  return fmt::format("{}, part {}{}", file_.path(), part.number, name);
 }
 
 uint64_t ExrFile::chunkCount(const PartInfo& part) const {

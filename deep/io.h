@@ -57,6 +57,9 @@ class Reader {
   const PartInfo& part() const;
   // The number of samples of each pixel of rows [y0, y1).
   Buffer<uint32_t> sampleCounts(int y0, int y1);
+  // Where a band ends that begins at y0 and takes at most `bytes` decoded; it holds whole tiles, at least one row of
+  // them.
+  int bandEnd(int y0, size_t bytes);
   // Rows [y0, y1) of the data window, as an image whose data window is that band.
   DeepImage read(int y0, int y1);
   DeepImage read();

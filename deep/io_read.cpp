@@ -63,7 +63,7 @@ void checkLayout(const std::string& where, const PartInfo& part) {
   const Imf::ChannelList& channels = part.attributes.header().channels();
   for (auto c = channels.begin(); c != channels.end(); ++c)
     if (c.channel().xSampling != 1 || c.channel().ySampling != 1)
-      fail("{}, channel {}: expected sampling 1 1, found {} {}", where, c.name(), c.channel().xSampling,
+      fail("{}, channel {}: expected sampling 1 1, found {} {}", where, printable(c.name()), c.channel().xSampling,
            c.channel().ySampling);
 }
 
@@ -281,6 +281,27 @@ Buffer<uint32_t> Reader::sampleCounts(int y0, int y1) {
   Buffer<uint32_t> result(band.area());
   std::copy_n(all.data() + area.index(area.x0, y0), result.size(), result.data());
   return result;
+}
+
+int Reader::bandEnd(int y0, size_t bytes) {
+  const Box& window = impl_->part.dataWindow;
+  const size_t width = size_t(window.width());
+  const int step = impl_->part.tiled ? impl_->part.tileHeight : 16;
+  double used = 0;
+  for (int y = y0; y < window.y1;) {
+    const int next =
+        int(std::min<int64_t>(window.y1, int64_t(impl_->wholeChunks({window.x0, y, window.x1, y + 1}).y0) + step));
+    const Buffer<uint32_t> counts = sampleCounts(y, next);
+    for (int row = 0; row < next - y; ++row) {
+      const uint32_t* first = counts.data() + size_t(row) * width;
+      const double samples = std::accumulate(first, first + width, 0.0);
+      used += 12.0 * double(width) + samples * double(impl_->wantedBytes());
+      const int place = impl_->part.tiled ? y : y + row;
+      if (used > double(bytes) && place > y0) return place;
+    }
+    y = next;
+  }
+  return window.y1;
 }
 
 DeepImage Reader::read(int y0, int y1) {

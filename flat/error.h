@@ -27,4 +27,11 @@ inline std::string oneLine(std::string text) {
   return text;
 }
 
+// A name from a file, fit for a line of text: control characters become '?'.
+inline std::string printable(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  return text;
+}
+
 }  // namespace fathom
