@@ -1,7 +1,121 @@
+// `fathom cluster`.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+
+#include "cli/bands.h"
 #include "cli/commands.h"
+#include "deep/cluster.h"
+#include "deep/ppu_scale.h"
+#include "flat/error.h"
 
 namespace fathom::cli {
 
-void addCluster(CLI::App&) {}
+namespace {
+
+struct ClusterCommand {
+  std::string input, output;
+  std::string part;  // number or name; empty: the first deep part
+  deep::ClusterParams params;
+  float ppuScale = 0;   // 0: from the file
+  std::string prepass;  // empty: bins from the samples themselves
+};
+
+// Where the bins of a band lie.
+class LayoutSource {
+ public:
+  LayoutSource(const ClusterCommand& command, const deep::PartInfo& part) : params_(command.params) {
+    if (!command.prepass.empty()) {
+      prepass_.emplace(command.prepass, deep::ReadOptions{.part = {}, .channels = [](const std::string& name) {
+                                                            return name == "Z" || name == "ZBack" || name == "A";
+                                                          }});
+      return;
+    }
+    try {
+      ppuScale_ = command.ppuScale > 0 ? command.ppuScale : deep::findPpuScale(part.attributes, part.displayWindow);
+    } catch (const Error& e) {
+      fail("{}: {}", command.input, e.what());
+    }
+  }
+
+  deep::BinLayout of(const deep::DeepImage& band) {
+    if (!prepass_) return deep::findBins(band, ppuScale_, params_);
+    const Box& rows = prepass_->part().dataWindow;
+    const int y0 = std::clamp(band.dataWindow.y0, rows.y0, rows.y1), y1 = std::clamp(band.dataWindow.y1, y0, rows.y1);
+    return deep::layoutFrom(prepass_->read(y0, y1));
+  }
+
+ private:
+  deep::ClusterParams params_;
+  float ppuScale_ = 0;
+  std::optional<deep::Reader> prepass_;
+};
+
+size_t countLost(const deep::DeepImage& samples, const deep::BinLayout& layout) {
+  const Box& window = samples.dataWindow;
+  size_t lost = 0;
+  for (int y = window.y0; y < window.y1; ++y)
+    for (int x = window.x0; x < window.x1; ++x)
+      if (layout.at(x, y).size() == 0) lost += samples.count(window.index(x, y));
+  return lost;
+}
+
+void runCluster(const ClusterCommand& command) {
+  deep::Reader reader(command.input, {.part = command.part, .channels = {}});
+  LayoutSource layouts(command, reader.part());
+  deep::DeepImage head = readLayout(reader);
+  head = deep::cluster(head, layouts.of(head));
+  if (command.ppuScale > 0) head.attributes.set("fathom:ppuScale", command.ppuScale);
+  const deep::PartInfo& part = reader.part();
+  deep::Writer writer(command.output, head, part.dataWindow, likeInput(command.input, part));
+  size_t samples = 0, bins = 0, lost = 0;
+  forEachBand(command.input, reader, [&](const deep::DeepImage& band) {
+    const deep::BinLayout layout = layouts.of(band);
+    const deep::DeepImage clustered = deep::cluster(band, layout);
+    samples += band.samples();
+    bins += clustered.samples();
+    lost += countLost(band, layout);
+    writer.write(clustered);
+  });
+  writer.finish();
+  fmt::print("{}: {} bins of {} samples, {:.2f} bins per pixel\n", command.output, bins, samples,
+             double(bins) / double(std::max<size_t>(part.dataWindow.area(), 1)));
+  if (lost > 0) fmt::print("{} samples lie in pixels without bins in {}: left out\n", lost, command.prepass);
+}
+
+}  // namespace
+
+void addCluster(CLI::App& app) {
+  auto command = std::make_shared<ClusterCommand>();
+  CLI::App* sub = app.add_subcommand(
+      "cluster",
+      "Gather the samples of a deep render (one deep sample per camera sample, or any other deep EXR) into a few bins "
+      "per "
+      "pixel by depth, with the means, variances, half buffers and counts that `fathom denoise` works from.");
+  sub->add_option("input", command->input, "The deep EXR with the samples")->required();
+  sub->add_option("-o,--output", command->output, "The deep EXR with the bins to write")->required();
+  sub->add_option("--part", command->part, "The part to take, by number or name; without it the first deep one");
+  sub->add_option("--E", command->params.E,
+                  "How fast bins get coarser behind the first one of a pixel; larger: fewer bins")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 16.0));
+  sub->add_option("--first", command->params.first,
+                  "Bin b = 1, 2, ... spans gaps of up to (b + first)^E pixel widths in depth; larger: fewer bins")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
+  CLI::Option* scale =
+      sub->add_option(
+             "--ppu-scale", command->ppuScale,
+             "The size in pixels of a one-unit quad one unit from the camera, where the file does not tell: image "
+             "width / (2 tan(half the horizontal field of view))")
+          ->check(CLI::PositiveNumber);
+  sub->add_option(
+         "--bins", command->prepass,
+         "Take the bins from this deep EXR (a depth prepass: Z, and alphas if it has A) instead of from the samples")
+      ->excludes(scale);
+  sub->callback([command] { runCluster(*command); });
+}
 
 }  // namespace fathom::cli
