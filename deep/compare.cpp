@@ -44,12 +44,14 @@ double finiteVariance(float v) {
 BinMetrics compareBins(const DeepImage& image, const DeepImage& reference, const DeepMetricParams& params) {
   const auto alpha = image.get("A"), referenceAlpha = reference.get("A"), samples = reference.tryGet("samples");
   const auto variances = variancesOf(reference);
+  if (params.correct && variances[0].empty())
+    fail("channel variance.R: expected in the reference, to correct for its own error, found none");
   std::array<std::span<const float>, 3> colours, referenceColours;
   for (size_t c = 0; c < 3; ++c) colours[c] = image.get(kColours[c]), referenceColours[c] = reference.get(kColours[c]);
   const Buffer<float> weights = effectiveAlpha(reference);
 
   BinMetrics result;
-  double weight = 0, few = 0, relative = 0, squared = 0, own = 0;
+  double weight = 0, few = 0, relative = 0, squared = 0, ownRelative = 0, own = 0;
   for (size_t i = 0; i < weights.size(); ++i) {
     const double w = weights[i], a = opacity(alpha[i]), r = opacity(referenceAlpha[i]);
     if (!(w > 0)) continue;
@@ -57,13 +59,15 @@ BinMetrics compareBins(const DeepImage& image, const DeepImage& reference, const
       few += w;
       continue;
     }
-    double binRelative = 0, binSquared = 0, binOwn = 0;
+    double binRelative = 0, binSquared = 0, binOwnRelative = 0, binOwn = 0;
     for (size_t c = 0; c < 3; ++c) {
       const double y = double(referenceColours[c][i]) / r, error = double(colours[c][i]) / a - y;
       const double scale = 1 / (y * y + kDark);
       binSquared += error * error;
       binRelative += error * error * scale;
-      if (!variances[c].empty()) binOwn += finiteVariance(variances[c][i]) * scale;
+      if (variances[c].empty()) continue;
+      binOwnRelative += finiteVariance(variances[c][i]) * scale;
+      binOwn += finiteVariance(variances[c][i]);
     }
     if (!std::isfinite(binSquared)) {
       ++result.excluded;
@@ -71,12 +75,13 @@ BinMetrics compareBins(const DeepImage& image, const DeepImage& reference, const
     }
     ++result.bins;
     weight += w;
-    relative += w * binRelative, squared += w * binSquared, own += w * binOwn;
+    relative += w * binRelative, squared += w * binSquared;
+    ownRelative += w * binOwnRelative, own += w * binOwn;
   }
   if (result.bins == 0) fail("expected bins to compare, found none with alpha, finite colours and enough samples");
-  result.relMse = (relative - (params.correct ? own : 0)) / (3 * weight);
-  result.mse = squared / (3 * weight);
-  if (!variances[0].empty()) result.ownRelMse = own / (3 * weight);
+  result.relMse = (relative - (params.correct ? ownRelative : 0)) / (3 * weight);
+  result.mse = (squared - (params.correct ? own : 0)) / (3 * weight);
+  if (!variances[0].empty()) result.ownRelMse = ownRelative / (3 * weight);
   result.leftOut = few / (few + weight);
   return result;
 }

@@ -17,9 +17,9 @@
 namespace fathom::deep {
 
 struct DeepMetricParams {
-  bool correct = false;      // subtract the reference's own error, which needs its `variance.{R,G,B}`
-  float minSamples = 16;     // camera samples of the reference (its channel `samples`) below which a bin is left out
-  std::vector<float> clips;  // depths of clip planes; a plane belongs to what is behind it
+  bool correct = false;   // subtract the reference's own error, which needs its `variance.{R,G,B}`
+  float minSamples = 16;  // camera samples of the reference (its channel `samples`) below which a bin is left out
+  std::vector<float> clips = {};  // depths of clip planes; a plane belongs to what is behind it
 };
 
 struct BinMetrics {

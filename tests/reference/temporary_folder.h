@@ -1,9 +1,10 @@
-// A folder of its own for one test, removed with it.
+// A folder of its own for one test (or for a part of one, by `name`), removed with it.
 #pragma once
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
@@ -11,10 +12,12 @@ namespace fathom {
 
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
+  explicit TemporaryFolder(const std::string& name = {}) {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::string(::testing::TempDir()) + "/fathom-" + test->test_suite_name() + "-" + test->name() + "-" +
-            std::to_string(getpid());
+    std::string folder = std::string("fathom-") + test->test_suite_name() + "-" + test->name() + "-" + name + "-" +
+                         std::to_string(::getpid());
+    std::ranges::replace(folder, '/', '-');
+    path_ = ::testing::TempDir() + "/" + folder;
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {

@@ -1,0 +1,108 @@
+#include "deep/clip.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "deep/flatten.h"
+#include "deep/tidy.h"
+#include "tests/reference/deep_samples.h"
+
+namespace fathom::deep {
+namespace {
+
+using reference::makeDeep;
+using reference::Sample;
+using reference::samplesOf;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Points and volumes behind one another, opaque ones and empty pixels among them.
+DeepImage makeStack(unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit;
+  reference::Pixels pixels(24);
+  for (auto& pixel : pixels) {
+    float z = unit(random);
+    for (int n = int(random() % 6); n > 0; --n) {
+      const float length = random() % 2 ? unit(random) : 0;
+      const float alpha = random() % 4 ? unit(random) : 1;
+      pixel.push_back({z, z + length, alpha, alpha * unit(random), uint32_t(random())});
+      z += length + 0.1f + unit(random);
+    }
+  }
+  return makeDeep(pixels, 6);
+}
+
+TEST(Clip, RangesAreHalfOpen) {
+  const DeepImage image = makeDeep({{{1, 1, 0.5f, 0.1f, 7}, {2, 2, 0.5f, 0.2f, 8}, {3, 3, 0.5f, 0.3f, 9}}}, 1);
+  const auto kept = samplesOf(clip(image, 1, 3), 0);
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(kept[0].id, 7u);
+  EXPECT_EQ(kept[1].id, 8u);
+  EXPECT_EQ(clip(image, 3, 1).samples(), 0u);
+  EXPECT_EQ(clip(image, 2, 2).samples(), 0u);
+}
+
+TEST(Clip, AVolumeIsCutIntoPartsThatMakeTheWhole) {
+  const DeepImage image = makeDeep({{{2, 6, 0.75f, 0.3f, 5}}}, 1);
+  const auto front = samplesOf(clip(image, 0, 4), 0), behind = samplesOf(clip(image, 4, 9), 0);
+  ASSERT_EQ(front.size(), 1u);
+  ASSERT_EQ(behind.size(), 1u);
+  // Half the length lets the root of what the whole lets through pass: 0.5.
+  for (const Sample& half : {front[0], behind[0]}) {
+    EXPECT_FLOAT_EQ(half.alpha, 0.5f);
+    EXPECT_FLOAT_EQ(half.colour, 0.2f);
+    EXPECT_EQ(half.id, 5u);
+  }
+  EXPECT_EQ(front[0].z, 2);
+  EXPECT_EQ(front[0].zBack, 4);
+  EXPECT_EQ(behind[0].z, 4);
+  EXPECT_EQ(behind[0].zBack, 6);
+}
+
+TEST(Clip, FrontOverBehindIsTheWhole) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const DeepImage image = makeStack(seed);
+    const flat::Image whole = flatten(image);
+    for (const float z : {0.0f, 0.7f, 1.3f, 2.0f, 3.1f, 50.0f}) {
+      const flat::Image front = flatten(clip(image, -kInfinity, z)), behind = flatten(clip(image, z, kInfinity));
+      for (const char* name : {"R", "B", "A"})
+        for (size_t i = 0; i < image.pixels(); ++i) {
+          const float passes = 1 - front.get("A").values[i];
+          EXPECT_NEAR(front.get(name).values[i] + passes * behind.get(name).values[i], whole.get(name).values[i], 2e-6f)
+              << name << " of pixel " << i << " at " << z << ", seed " << seed;
+        }
+    }
+  }
+}
+
+TEST(Clip, WhatIsNotCutPassesBitForBit) {
+  const DeepImage image = makeStack(3), all = clip(image, -kInfinity, kInfinity);
+  ASSERT_EQ(all.samples(), image.samples());
+  EXPECT_TRUE(std::ranges::equal(all.offsets, image.offsets));
+  for (const Channel& channel : image.channels) {
+    EXPECT_TRUE(std::ranges::equal(all.find(channel.name)->values, channel.values)) << channel.name;
+    EXPECT_TRUE(std::ranges::equal(all.find(channel.name)->ids, channel.ids)) << channel.name;
+  }
+}
+
+TEST(Clip, StatisticsOfCutSamplesAreVoid) {
+  DeepImage image = makeDeep({{{2, 6, 0.75f, 0.3f, 5}}}, 1);
+  for (const char* name : {"variance.R", "samples", "half0.R"}) image.add(name, PixelType::Float).values.fill(1);
+  EXPECT_TRUE(clip(image, 0, 10).find("variance.R"));
+  const DeepImage cut = clip(image, 0, 3);
+  for (const char* name : {"variance.R", "samples", "half0.R"}) EXPECT_FALSE(cut.find(name)) << name;
+  EXPECT_TRUE(cut.find("R"));
+}
+
+TEST(Clip, WithoutZBackAllSamplesArePoints) {
+  const DeepImage image = makeDeep({{{1, 9, 0.5f, 0.1f, 7}}, {{3, 9, 0.5f, 0.1f, 8}}}, 2, false);
+  const DeepImage front = clip(image, 0, 2);
+  EXPECT_EQ(front.count(0), 1u);
+  EXPECT_EQ(front.count(1), 0u);
+}
+
+}  // namespace
+}  // namespace fathom::deep
