@@ -27,9 +27,10 @@ run compare "demo/sequence.$frame.deep.exr" "demo/sequence.$frame.deepref.exr" -
 run compare "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.deepref.exr" --clip median
 
 say "Pictures: noisy, denoised, reference"
-run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.ref.exr" -o "$out/frame.png"
+run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.ref.exr" \
+  --labels noisy,denoised,reference -o "$out/frame.png"
 run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.deepref.exr" --clip 0,7 \
-  -o "$out/clipped.png"
+  --labels noisy,denoised,reference -o "$out/clipped.png"
 
 cat <<TEXT
 
