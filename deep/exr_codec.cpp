@@ -127,10 +127,10 @@ Unpacker::Unpacker() : inflate_(libdeflate_alloc_decompressor()) {
 }
 Unpacker::~Unpacker() = default;
 
-Unpacked Unpacker::unpack(Compression compression, std::span<const uint8_t> packed, size_t size) {
-  if (packed.size() == size) return {packed, false};
-  if (packed.size() > size || compression == Compression::None)
-    fail("expected {} bytes, found {}", size, packed.size());
+Unpacked Unpacker::unpack(Compression compression, std::span<const uint8_t> packed, size_t size, size_t rawSize) {
+  if (packed.size() == rawSize) return {packed.first(size), false};
+  if (packed.size() > rawSize || compression == Compression::None)
+    fail("expected {} bytes, found {}", rawSize, packed.size());
   if (scratch_.size() < size) scratch_ = Buffer<uint8_t>(size + size / 4);
   const std::span<uint8_t> bytes(scratch_.data(), size);
   const bool good = compression == Compression::Rle
@@ -150,7 +150,7 @@ Packer::Packer() : deflate_(libdeflate_alloc_compressor(kDeflateLevel)) {
 }
 Packer::~Packer() = default;
 
-void Packer::pack(Compression compression, std::span<const uint8_t> bytes, std::vector<uint8_t>& to) {
+void Packer::pack(Compression compression, std::span<const uint8_t> bytes, size_t rawSize, std::vector<uint8_t>& to) {
   const size_t begin = to.size();
   if (compression != Compression::None && !bytes.empty()) {
     if (scratch_.size() < bytes.size()) scratch_ = Buffer<uint8_t>(bytes.size() + bytes.size() / 4);
@@ -159,14 +159,14 @@ void Packer::pack(Compression compression, std::span<const uint8_t> bytes, std::
     if (compression == Compression::Rle) {
       packRuns(split, to);
     } else {
-      to.resize(begin + bytes.size());
-      to.resize(begin + libdeflate_zlib_compress(deflate_.get(), split.data(), split.size(), to.data() + begin,
-                                                 bytes.size() - 1));
+      to.resize(begin + rawSize);
+      to.resize(begin +
+                libdeflate_zlib_compress(deflate_.get(), split.data(), split.size(), to.data() + begin, rawSize - 1));
     }
-    if (to.size() > begin && to.size() - begin < bytes.size()) return;
+    if (to.size() > begin && to.size() - begin < rawSize) return;
   }
   to.resize(begin);
-  to.resize(begin + bytes.size());
+  to.resize(begin + rawSize);
   std::copy(bytes.begin(), bytes.end(), to.begin() + ptrdiff_t(begin));
 }
 

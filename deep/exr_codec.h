@@ -45,9 +45,11 @@ class Unpacker {
   Unpacker();
   ~Unpacker();
 
-  // Unpacks to exactly `size` bytes; throws an Error without a file ("expected ..., found ...") where that fails. The
-  // result refers to `packed` or to scratch that the next call overwrites.
-  Unpacked unpack(Compression compression, std::span<const uint8_t> packed, size_t size);
+  // Unpacks to exactly `size` bytes; throws an Error without a file ("expected ..., found ...") where that fails.
+  // `rawSize` (at least `size`) is how many bytes there are where they are not packed: a tile at the edge of the window
+  // has a table of counts as long as a whole tile's then. The result refers to `packed` or to scratch that the next
+  // call overwrites.
+  Unpacked unpack(Compression compression, std::span<const uint8_t> packed, size_t size, size_t rawSize);
 
  private:
   struct Free {
@@ -62,9 +64,9 @@ class Packer {
   Packer();
   ~Packer();
 
-  // Appends the packed bytes to `to`; the bytes as they are where packing does not make them fewer, as the format wants
-  // it.
-  void pack(Compression compression, std::span<const uint8_t> bytes, std::vector<uint8_t>& to);
+  // Appends the packed bytes to `to`, or where these are not fewer than `rawSize` the bytes as they are, filled up with
+  // zeros to `rawSize`.
+  void pack(Compression compression, std::span<const uint8_t> bytes, size_t rawSize, std::vector<uint8_t>& to);
 
  private:
   struct Free {

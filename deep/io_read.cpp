@@ -174,7 +174,8 @@ struct Reader::Impl {
     const std::span<uint8_t> packed = local.packedBytes(size_t(chunk.packedCounts));
     file.bytes().read(chunk.countsAt, packed.data(), packed.size());
     const std::span<uint32_t> sums = local.tableOf(chunk.box.area());
-    unpack(chunk, local, packed, sums.size_bytes()).copy(0, sums);
+    const size_t fullTable = 4 * (part.tiled ? size_t(part.tileWidth) * size_t(part.tileHeight) : sums.size());
+    unpack(chunk, local, packed, sums.size_bytes(), fullTable).copy(0, sums);
     uint64_t total = 0;
     for (int y = chunk.box.y0; y < chunk.box.y1; ++y) {
       const uint32_t* row = sums.data() + chunk.box.index(chunk.box.x0, y);
@@ -191,9 +192,10 @@ struct Reader::Impl {
       fail("{}: expected {} samples of {} bytes, found {} bytes", name(chunk), total, pixelBytes, chunk.sampleBytes);
   }
 
-  Unpacked unpack(const Chunk& chunk, Scratch& local, std::span<const uint8_t> packed, size_t size) const {
+  Unpacked unpack(const Chunk& chunk, Scratch& local, std::span<const uint8_t> packed, size_t size,
+                  size_t rawSize) const {
     try {
-      return local.unpacker.unpack(part.compression, packed, size);
+      return local.unpacker.unpack(part.compression, packed, size, rawSize);
     } catch (const Error& e) {
       fail("{}: {}", name(chunk), e.what());
     }
@@ -211,7 +213,7 @@ struct Reader::Impl {
     Scratch& local = scratch.local();
     const std::span<uint8_t> packed = local.packedBytes(size_t(chunk.packedSamples));
     file.bytes().read(chunk.countsAt + chunk.packedCounts, packed.data(), packed.size());
-    const Unpacked samples = unpack(chunk, local, packed, size_t(chunk.sampleBytes));
+    const Unpacked samples = unpack(chunk, local, packed, size_t(chunk.sampleBytes), size_t(chunk.sampleBytes));
     size_t at = 0;
     for (int y = chunk.box.y0; y < inside.y1; ++y) {
       const uint32_t* row = counts.data() + area.index(chunk.box.x0, y);

@@ -130,6 +130,8 @@ struct Writer::Impl {
   Impl(const std::string& path, const DeepImage& layout, const Box& window, const WriteOptions& opts)
       : file(path), options(opts), dataWindow(window), nextRow(window.y0) {
     tiled = options.tileWidth > 0 && options.tileHeight > 0;
+    options.tileWidth = std::min(options.tileWidth, dataWindow.width());
+    options.tileHeight = std::min(options.tileHeight, dataWindow.height());
     if (dataWindow.empty()) fail("{}: expected pixels, found an empty data window", path);
     if (layout.channels.empty()) fail("{}: expected channels, found none", path);
     Imf::Header header = makeHeader(path, layout, dataWindow, options);
@@ -277,9 +279,10 @@ struct Writer::Impl {
     const size_t sizesAt = bytes.size();
     bytes.resize(sizesAt + 3 * sizeof(uint64_t));
     const size_t countsAt = bytes.size();
-    local.packer.pack(options.compression, local.counts, bytes);
+    const size_t fullTable = tiled ? 4 * size_t(options.tileWidth) * size_t(options.tileHeight) : local.counts.size();
+    local.packer.pack(options.compression, local.counts, fullTable, bytes);
     const size_t samplesAt = bytes.size();
-    local.packer.pack(options.compression, local.samples, bytes);
+    local.packer.pack(options.compression, local.samples, local.samples.size(), bytes);
     const uint64_t sizes[] = {samplesAt - countsAt, bytes.size() - samplesAt, local.samples.size()};
     std::memcpy(bytes.data() + sizesAt, sizes, sizeof(sizes));
     return bytes;
