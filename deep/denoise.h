@@ -1,6 +1,8 @@
-// The deep denoiser: clean colours for every bin of a deep Monte Carlo render; bins, alphas and depths stay as they are.
+// The deep denoiser: clean colours for every bin of a deep Monte Carlo render; bins, alphas and depths stay as they
+// are.
 //
-// Source: Vicini et al., "Denoising Deep Monte Carlo Renderings", sections 4 and 5; the gate is Fathom's own (deep/gate).
+// Source: Vicini et al., "Denoising Deep Monte Carlo Renderings", sections 4 and 5; the gate is Fathom's own
+// (deep/gate).
 #pragma once
 
 #include <cstdint>
@@ -18,16 +20,17 @@ enum class Quality { Fast, Balanced, Best };
 
 // What of the channel convention a file offers. Decided once per sequence, so that frames do not differ in method.
 struct DenoiseInputs {
-  bool components = false;     // diffuse.* and specular.*; else R G B is the one component
-  bool halves = false;         // half0.* and half1.* of the components (or of R G B) with their sample counts
-  bool albedoHalves = false;   // half0.albedo.*, half1.albedo.*
-  bool variance = false;       // variance.{R,G,B}
-  bool counts = false;         // samples
+  bool components = false;    // diffuse.* and specular.*; else R G B is the one component
+  bool halves = false;        // half0.* and half1.* of the components (or of R G B) with their sample counts
+  bool halfCounts = false;    // half0.samples, half1.samples
+  bool albedoHalves = false;  // half0.albedo.*, half1.albedo.*
+  bool variance = false;      // variance.{R,G,B}
+  bool counts = false;        // samples
   bool albedo = false, albedoVariance = false;
   bool normal = false, normalVariance = false;
   bool depthVariance = false;
-  bool volumes = false;        // ZBack
-  int spp = 0;                 // fathom:spp; 0: unknown
+  bool volumes = false;  // ZBack
+  int spp = 0;           // fathom:spp; 0: unknown
 };
 
 DenoiseInputs findDenoiseInputs(std::span<const std::string> channels, const Attributes& attributes);
@@ -40,8 +43,9 @@ bool denoiseReads(const DenoiseInputs& inputs, const std::string& channel);
 
 struct DenoiseParams {
   Quality quality = Quality::Balanced;
-  bool gate = true;              // false: the paper's result
-  bool keepStatistics = false;   // keep half*, variance* and counts in the output, though they describe the noisy colours
+  bool gate = true;  // false: the paper's result
+  bool keepStatistics =
+      false;  // keep half*, variance* and counts in the output, though they describe the noisy colours
 };
 
 struct DenoisePlan {
@@ -62,8 +66,10 @@ struct DenoiseStats {
   std::map<std::string, uint64_t> counts;
 };
 
-// Takes an image of tidy bins (sorted, see `isTidy`) that follows DATA.md; returns it with R G B and the components filtered.
-// Alphas, depths, ids and channels it does not know pass unchanged. Throws Error (a channel missing) and Cancelled.
-DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress = {}, DenoiseStats* stats = nullptr);
+// Takes an image of tidy bins (sorted, see `isTidy`) that follows DATA.md; returns it with R G B and the components
+// filtered. Alphas, depths, ids and channels it does not know pass unchanged. Throws Error (a channel missing) and
+// Cancelled.
+DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress = {},
+                  DenoiseStats* stats = nullptr);
 
 }  // namespace fathom::deep

@@ -1,0 +1,55 @@
+// What the deep filter works on, made once from the channels of a frame.
+//
+// Source: Vicini et al., sections 4.1, 5.2 and 5.3. Everything here is of the value *not* premultiplied.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "deep/denoise.h"
+#include "deep/joint_filter.h"
+#include "flat/buffer.h"
+
+namespace fathom::deep {
+
+// Added to the albedo before the diffuse light is divided by it (section 5.2), and multiplied back with it.
+inline constexpr float kAlbedoOffset = 0.03f;
+
+// Colours of larger magnitude count as non-finite (DATA.md).
+inline constexpr float kLargest = 1e15f;
+
+// A feature over all bins: up to three channels of values, and the variances of those means.
+struct Feature {
+  std::vector<Buffer<float>> value, variance;
+};
+
+// One of the parts of the light that are filtered apart: effective irradiance, specular light, or the whole colour.
+struct DenoiseComponent {
+  std::string name;        // "diffuse", "specular", or "" for R G B
+  bool perAlbedo = false;  // divided by albedo + kAlbedoOffset
+  Buffer<float> data;      // per bin 8, see FilterComponent
+  std::vector<Buffer<float>>
+      variance;  // per channel and bin, of the mean; only without halves, and where the file tells
+};
+
+struct DenoiseData {
+  int width = 0, height = 0, rowPhase = 0;
+  const uint64_t* offsets = nullptr;
+  bool halves = false;   // block 0 and 1 are half buffers; else block 0 has all samples and block 1 nothing
+  Buffer<float> weight;  // per bin: its effective alpha
+  Buffer<float> count;   // per bin: camera samples that fell in it
+  std::vector<DenoiseComponent> components;
+  Feature albedo, normal, depth;  // without channels where the file has none; depth is the logarithm
+  uint64_t nonFinite = 0;         // bins with a colour that is not finite
+
+  size_t bins() const { return size_t(offsets[size_t(width) * size_t(height)]); }
+};
+
+// Reads what the plan says is there; throws Error by the name of a channel that is missing. `image` must outlive the
+// result.
+DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs);
+
+// The mean of the colours of both blocks of a bin, from 8 values of `data`; 0 where neither has samples.
+std::array<float, 3> meanOf(const float* data);
+
+}  // namespace fathom::deep

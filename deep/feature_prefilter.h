@@ -1,0 +1,18 @@
+// Albedo and normals filtered before they guide the colours.
+//
+// Source: Vicini et al., section 4.2, "Auxiliary feature prefiltering", with its parameters: the joint deep filter with
+// colour weights from the flattened feature itself, and depth as the only feature.
+#pragma once
+
+#include "deep/denoise_data.h"
+
+namespace fathom::deep {
+
+inline constexpr int kPrefilterRadius = 2, kPrefilterPatchRadius = 1;
+
+// Replaces albedo and normal, where the data has them, by filtered ones, and their variances by those of the filtered
+// means: the bin's own share of the weights times its variance, which is exact where the neighbours are as noisy and
+// weigh the same.
+void prefilterFeatures(DenoiseData& data);
+
+}  // namespace fathom::deep

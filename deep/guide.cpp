@@ -1,0 +1,158 @@
+#include "deep/guide.h"
+
+#include <cmath>
+
+#include "flat/parallel.h"
+
+namespace fathom::deep {
+
+namespace {
+
+// Gaussian of sigma 0.5 over three pixels; further ones weigh less than 4e-4.
+constexpr float kSide = 0.10650697891920f, kMiddle = 1 - 2 * kSide;
+
+void blurThenMaximum(flat::Padded& variance, int width, int height) {
+  variance.extend();
+  flat::Padded across(width, height, 1), blurred(width, height, 1);
+  parallelFor(0, height, [&](int y) {
+    const float* in = variance.row(y);
+    float* out = across.row(y);
+    for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (in[x - 1] + in[x + 1]);
+  });
+  across.extend();
+  parallelFor(0, height, [&](int y) {
+    const float *above = across.row(y - 1), *in = across.row(y), *below = across.row(y + 1);
+    float* out = blurred.row(y);
+    for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (above[x] + below[x]);
+  });
+  parallelFor(0, height, [&](int y) {
+    float* v = variance.row(y);
+    const float* b = blurred.row(y);
+    for (int x = 0; x < width; ++x) v[x] = std::max(v[x], b[x]);
+  });
+}
+
+// Where nothing tells the noise: the residual against the mean of the four neighbours, whose expectation for a smooth
+// image is 5/4 of the variance, averaged over 5x5 pixels.
+void estimateVariance(const flat::Padded& value, flat::Padded& variance, int width, int height) {
+  flat::Padded residual(width, height, 2);
+  parallelFor(0, height, [&](int y) {
+    const float *above = value.row(y - 1), *in = value.row(y), *below = value.row(y + 1);
+    for (int x = 0; x < width; ++x) {
+      const float e = in[x] - 0.25f * (above[x] + below[x] + in[x - 1] + in[x + 1]);
+      residual.row(y)[x] = 0.8f * e * e;
+    }
+  });
+  residual.extend();
+  parallelFor(0, height, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      float sum = 0;
+      for (int dy = -2; dy <= 2; ++dy)
+        for (int dx = -2; dx <= 2; ++dx) sum += residual.row(y + dy)[x + dx];
+      variance.row(y)[x] = sum / 25;
+    }
+  });
+}
+
+void flattenBlock(const DenoiseData& data, const float* values, int block, Guide& guide) {
+  parallelFor(0, data.height, [&](int y) {
+    const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
+    for (int x = 0; x < data.width; ++x) {
+      float sum[3] = {0, 0, 0};
+      for (uint64_t b = offsets[x]; b < offsets[x + 1]; ++b)
+        for (size_t c = 0; c < 3; ++c) sum[c] += values[8 * b + 4 * size_t(block) + c];
+      for (size_t c = 0; c < 3; ++c) guide.value[c].row(y)[x] = sum[c];
+    }
+  });
+}
+
+// Sums of weight^2 times the bins' variance.
+void flattenVariance(const DenoiseData& data, const Buffer<float>& variance, flat::Padded& out) {
+  parallelFor(0, data.height, [&](int y) {
+    const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
+    for (int x = 0; x < data.width; ++x) {
+      float sum = 0;
+      for (uint64_t b = offsets[x]; b < offsets[x + 1]; ++b) sum += data.weight[b] * data.weight[b] * variance[b];
+      out.row(y)[x] = sum;
+    }
+  });
+}
+
+}  // namespace
+
+ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& component, int pad) {
+  ComponentGuide guide;
+  for (size_t c = 0; c < 3; ++c) {
+    for (int h = 0; h < 2; ++h) guide.value[size_t(h)].value[c] = flat::Padded(data.width, data.height, pad);
+    guide.variance.value[c] = flat::Padded(data.width, data.height, pad);
+  }
+  for (int h = 0; h < 2; ++h) flattenBlock(data, component.data.data(), data.halves ? h : 0, guide.value[size_t(h)]);
+  for (size_t c = 0; c < 3; ++c) {
+    flat::Padded &first = guide.value[0].value[c], &second = guide.value[1].value[c],
+                 &variance = guide.variance.value[c];
+    first.extend();
+    second.extend();
+    if (data.halves) {
+      // Of one half: twice the two-buffer variance of the mean.
+      parallelFor(0, data.height, [&](int y) {
+        for (int x = 0; x < data.width; ++x) {
+          const float e = first.row(y)[x] - second.row(y)[x];
+          variance.row(y)[x] = 0.5f * e * e;
+        }
+      });
+    } else if (!component.variance.empty()) {
+      flattenVariance(data, component.variance[c], variance);
+    } else {
+      estimateVariance(first, variance, data.width, data.height);
+    }
+    blurThenMaximum(variance, data.width, data.height);
+    variance.extend();
+  }
+  return guide;
+}
+
+FeatureGuide featureGuide(const DenoiseData& data, const Feature& feature, int pad) {
+  FeatureGuide guide;
+  for (size_t c = 0; c < 3; ++c) {
+    guide.value.value[c] = flat::Padded(data.width, data.height, pad);
+    guide.variance.value[c] = flat::Padded(data.width, data.height, pad);
+    const size_t from = std::min(c, feature.value.size() - 1);
+    flattenVariance(data, feature.variance[from], guide.variance.value[c]);
+    parallelFor(0, data.height, [&](int y) {
+      const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
+      for (int x = 0; x < data.width; ++x) {
+        float sum = 0, weight = 0;
+        for (uint64_t b = offsets[x]; b < offsets[x + 1]; ++b) {
+          sum += data.weight[b] * feature.value[from][b];
+          weight += data.weight[b];
+        }
+        guide.value.value[c].row(y)[x] = weight > 0 ? sum / weight : 0;
+        if (weight > 0) guide.variance.value[c].row(y)[x] /= weight * weight;
+      }
+    });
+    guide.value.value[c].extend();
+    guide.variance.value[c].extend();
+  }
+  return guide;
+}
+
+std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Feature& feature) {
+  std::vector<Buffer<float>> result;
+  if (feature.value.empty()) return result;
+  const FeatureGuide guide = featureGuide(data, feature, 1);
+  for (size_t c = 0; c < feature.value.size(); ++c) {
+    const flat::Padded& value = guide.value.value[c];
+    Buffer<float>& gradient = result.emplace_back(size_t(data.width) * size_t(data.height));
+    parallelFor(0, data.height, [&](int y) {
+      const float *above = value.row(y - 1), *in = value.row(y), *below = value.row(y + 1);
+      float* out = gradient.data() + size_t(y) * size_t(data.width);
+      for (int x = 0; x < data.width; ++x) {
+        const float gx = 0.5f * (in[x + 1] - in[x - 1]), gy = 0.5f * (below[x] - above[x]);
+        out[x] = gx * gx + gy * gy;
+      }
+    });
+  }
+  return result;
+}
+
+}  // namespace fathom::deep

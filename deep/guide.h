@@ -1,0 +1,32 @@
+// Flattened guides: what the pixel weights and the feature gradients of the deep filter are made from.
+//
+// Source: Vicini et al., sections 4.1 (gradients of the flattened features) and 5.3 (two-buffer variance, blurred, then
+// the maximum of both).
+#pragma once
+
+#include "deep/denoise_data.h"
+#include "deep/joint_filter.h"
+#include "flat/image.h"
+
+namespace fathom::deep {
+
+// The flattened blocks of a component and the variance of each, which the blocks share where they are halves.
+struct ComponentGuide {
+  std::array<Guide, 2> value;
+  GuideVariance variance;
+};
+
+// `variance`: per bin and channel the variance of the mean of the component, used where there are no halves.
+ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& component, int pad);
+
+// The flattened mean of a feature (over the pixel's alpha) and its variance, padded.
+struct FeatureGuide {
+  Guide value;
+  GuideVariance variance;
+};
+FeatureGuide featureGuide(const DenoiseData& data, const Feature& feature, int pad);
+
+// Per channel of the feature and pixel: the squared magnitude of the gradient of the flattened feature.
+std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Feature& feature);
+
+}  // namespace fathom::deep

@@ -1,0 +1,188 @@
+#include "deep/selection.h"
+
+#include <cmath>
+
+#include "flat/bilateral.h"
+#include "flat/parallel.h"
+
+namespace fathom::deep {
+
+namespace {
+
+using Rgb = std::array<float, 3>;
+
+constexpr float kLeastWeight = 1e-12f;  // sums of weights below this say nothing
+constexpr float kErrorSharpness = 2;    // see BilateralParams
+constexpr float kBlendSigma = 2.5f;
+constexpr float kLeastError = 0.03f;  // of the largest candidate's error: below it estimates are noise
+
+// What the halves of one candidate come to in one pixel.
+struct PixelHalves {
+  std::array<Rgb, 2> filtered{}, noisy{};
+  std::array<float, 2> share{};
+  float alpha = 0;
+};
+
+// The filtered values of both halves of a bin; a half without weights takes the other's. False where neither has any.
+bool filteredHalves(const float* sums, std::array<Rgb, 2>& value) {
+  const bool has[2] = {sums[3] > kLeastWeight, sums[7] > kLeastWeight};
+  if (!has[0] && !has[1]) return false;
+  for (size_t h = 0; h < 2; ++h) {
+    const size_t from = has[h] ? h : 1 - h;
+    const float inverse = 1 / sums[4 * from + 3];
+    for (size_t i = 0; i < 3; ++i) value[h][i] = sums[4 * from + i] * inverse;
+  }
+  return true;
+}
+
+// Adds one bin of one candidate; `in` is the bin's noisy data.
+void addBin(const float* in, const float* sums, const float* own, float weight, PixelHalves& pixel, float* out) {
+  std::array<Rgb, 2> f;
+  if (!filteredHalves(sums, f)) return;
+  pixel.alpha += weight;
+  for (size_t c = 0; c < 3; ++c) out[c] = 0.5f * (f[0][c] + f[1][c]);
+  for (size_t h = 0; h < 2; ++h) {
+    const size_t from = in[4 * h + 3] > 0 ? h : 1 - h;
+    const float scale = in[4 * from + 3] > 0 ? weight / in[4 * from + 3] : 0;
+    for (size_t c = 0; c < 3; ++c) {
+      pixel.filtered[h][c] += weight * f[h][c];
+      pixel.noisy[h][c] += scale * in[4 * from + c];
+    }
+    if (sums[4 * h + 3] > kLeastWeight) pixel.share[h] += weight * own[h] / sums[4 * h + 3];
+  }
+}
+
+float squaredError(const PixelHalves& pixel) {
+  if (!(pixel.alpha > 0)) return 0;
+  float error = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    const float e = pixel.noisy[0][c] - pixel.noisy[1][c];
+    const float variance = 0.5f * e * e;
+    for (size_t h = 0; h < 2; ++h) {
+      const float r = pixel.filtered[h][c] - pixel.noisy[h][c];
+      error += 0.5f * (r * r - (1 - 2 * pixel.share[h] / pixel.alpha) * variance);
+    }
+    const float d = pixel.filtered[0][c] - pixel.filtered[1][c];
+    error -= 0.25f * d * d;
+  }
+  return error;
+}
+
+// The same without halves: the weights do know the noise of what they average, and the estimate is a little too small.
+float squaredErrorOfWhole(const PixelHalves& pixel, const GuideVariance& variance, int x, int y) {
+  if (!(pixel.alpha > 0)) return 0;
+  float error = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    const float r = pixel.filtered[0][c] - pixel.noisy[0][c];
+    error += r * r - (1 - 2 * pixel.share[0] / pixel.alpha) * variance.value[c].row(y)[x];
+  }
+  return error;
+}
+
+// Gaussian of kBlendSigma, separable, in place.
+void blur(const DenoiseData& data, flat::Padded& plane) {
+  std::array<float, 2 * kBlendRadius + 1> kernel;
+  float sum = 0;
+  for (int i = -kBlendRadius; i <= kBlendRadius; ++i) {
+    kernel[size_t(i + kBlendRadius)] = std::exp(-0.5f * float(i * i) / (kBlendSigma * kBlendSigma));
+    sum += kernel[size_t(i + kBlendRadius)];
+  }
+  for (float& k : kernel) k /= sum;
+  plane.extend();
+  flat::Padded across(data.width, data.height, kBlendRadius);
+  parallelFor(0, data.height, [&](int y) {
+    std::fill_n(across.row(y), data.width, 0.0f);
+    for (int i = -kBlendRadius; i <= kBlendRadius; ++i)
+      for (int x = 0; x < data.width; ++x) across.row(y)[x] += kernel[size_t(i + kBlendRadius)] * plane.row(y)[x + i];
+  });
+  across.extend();
+  parallelFor(0, data.height, [&](int y) {
+    std::fill_n(plane.row(y), data.width, 0.0f);
+    for (int i = -kBlendRadius; i <= kBlendRadius; ++i)
+      for (int x = 0; x < data.width; ++x) plane.row(y)[x] += kernel[size_t(i + kBlendRadius)] * across.row(y + i)[x];
+  });
+}
+
+// Replaces errors by the candidates' parts of the blend, which sum to one.
+void blendWeights(const DenoiseData& data, float level, std::vector<flat::Padded>& error) {
+  const float least = 1e-12f * level * level;
+  parallelFor(0, data.height, [&](int y) {
+    for (int x = 0; x < data.width; ++x) {
+      float worst = 0, sum = 0;
+      for (const flat::Padded& e : error) worst = std::max(worst, e.row(y)[x]);
+      for (flat::Padded& e : error) {
+        const float ratio = (worst + least) / (std::max(e.row(y)[x], kLeastError * worst) + least);
+        sum += e.row(y)[x] = ratio * ratio;
+      }
+      for (flat::Padded& e : error) e.row(y)[x] /= sum;
+    }
+  });
+  for (flat::Padded& e : error) blur(data, e);
+}
+
+}  // namespace
+
+Candidates::Candidates(const DenoiseData& data, int candidates) {
+  const auto zeros = [&] {
+    flat::Padded plane(data.width, data.height, std::max(kErrorRadius, kBlendRadius));
+    for (int y = 0; y < data.height; ++y) std::fill_n(plane.row(y), data.width, 0.0f);
+    return plane;
+  };
+  for (int k = 0; k < candidates; ++k) {
+    value.emplace_back(data.bins() * 3, 0.0f);
+    error.push_back(zeros());
+  }
+  for (int c = 0; c < 3; ++c) flattened.push_back(zeros());
+}
+
+void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
+                   const FilterTile& tile, int c, const Buffer<uint8_t>& still, Candidates& candidates) {
+  size_t i = 0;
+  for (int y = tile.box.y0; y < tile.box.y1; ++y) {
+    for (int x = tile.box.x0; x < tile.box.x1; ++x) {
+      const size_t pixel = size_t(y) * size_t(data.width) + size_t(x);
+      const size_t begin = size_t(data.offsets[pixel]), end = size_t(data.offsets[pixel + 1]);
+      for (int k = 0; k < tile.candidates && !still[pixel]; ++k) {
+        PixelHalves halves;
+        for (size_t b = begin; b < end; ++b)
+          addBin(component.data.data() + 8 * b, tile.at(i + b - begin, c, k), tile.own(i + b - begin, c, k),
+                 data.weight[b], halves, candidates.value[size_t(k)].data() + 3 * b);
+        candidates.error[size_t(k)].row(y)[x] =
+            data.halves ? squaredError(halves) : squaredErrorOfWhole(halves, variance, x, y);
+        for (size_t ch = 0; ch < 3; ++ch)
+          candidates.flattened[ch].row(y)[x] +=
+              (halves.filtered[0][ch] + halves.filtered[1][ch]) / float(2 * tile.candidates);
+      }
+      i += end - begin;
+    }
+  }
+}
+
+Buffer<float> blendCandidates(const DenoiseData& data, Candidates candidates, float level) {
+  if (candidates.value.size() == 1) return std::move(candidates.value[0]);
+  for (flat::Padded& plane : candidates.error) plane.extend();
+  for (flat::Padded& plane : candidates.flattened) plane.extend();
+  std::vector<flat::Padded> smooth;
+  for (size_t k = 0; k < candidates.error.size(); ++k) smooth.emplace_back(data.width, data.height, kBlendRadius);
+  flat::BilateralParams params;
+  params.radius = kErrorRadius;
+  params.sharpness = kErrorSharpness;
+  params.floor = 4e-4f * level * level;
+  flat::bilateral(data.width, data.height, params, candidates.flattened, candidates.error, smooth);
+  blendWeights(data, level, smooth);
+  parallelFor(0, data.height, [&](int y) {
+    const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
+    for (int x = 0; x < data.width; ++x) {
+      for (size_t b = size_t(offsets[x]); b < size_t(offsets[x + 1]); ++b) {
+        for (size_t c = 0; c < 3; ++c) {
+          float sum = 0;
+          for (size_t k = 0; k < smooth.size(); ++k) sum += smooth[k].row(y)[x] * candidates.value[k][3 * b + c];
+          candidates.value[0][3 * b + c] = sum;
+        }
+      }
+    }
+  });
+  return std::move(candidates.value[0]);
+}
+
+}  // namespace fathom::deep

@@ -1,0 +1,41 @@
+// Which candidate filter is best where: error estimates of the flattened candidates, and the maps that blend them.
+//
+// Source: Vicini et al., section 4.2, "Color filtering". Three departures, each measured on the shared renders:
+// - Equation 13 compares a filtered half with the other half. With crossed weights the filtered half already knows the
+// other
+//   half's noise, and strong colour weights look better than they are. Given weights that do not know it, the filter is
+//   linear in its own half and Stein's estimate needs no derivative of the weights: MSE[F_h] = (F_h - C_h)^2 - (1 - 2
+//   s_h) Var[C_h], with s_h the share of the sum of weights that the pixel itself has; and MSE[F] = (MSE[F_0] +
+//   MSE[F_1]) / 2 - Var[F], with Var[F] = (F_0 - F_1)^2 / 4 as in the paper.
+// - The estimates are smoothed by the flat filter over 11x11 pixels with weights from the candidates' own flattened
+// colour.
+// - Candidates are mixed in proportion to 1 / MSE^2 instead of taking the best one: a sixth less error on average.
+#pragma once
+
+#include <vector>
+
+#include "deep/denoise_data.h"
+
+namespace fathom::deep {
+
+inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
+
+// What a filter bank made of one component.
+struct Candidates {
+  std::vector<Buffer<float>> value;  // [candidate], per bin 3
+  std::vector<flat::Padded> error;   // [candidate], per pixel: estimated squared error of the flattened value, R + G +
+                                    // B; unbiased, so negative at times
+  std::vector<flat::Padded> flattened;  // [channel], per pixel: the mean of the candidates
+
+  Candidates(const DenoiseData& data, int candidates);
+};
+
+// Adds the sums of one tile, where the component is the c-th that was filtered. Pixels with still[pixel] != 0 are left
+// at 0. `variance`: of the flattened component, used where there are no halves.
+void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
+                   const FilterTile& tile, int c, const Buffer<uint8_t>& still, Candidates& candidates);
+
+// The blend of the candidates, per bin 3. Takes the candidates' storage. `level`: the mean colour of the frame.
+Buffer<float> blendCandidates(const DenoiseData& data, Candidates candidates, float level);
+
+}  // namespace fathom::deep

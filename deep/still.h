@@ -1,0 +1,25 @@
+// Which pixels need no denoising: nothing noisy within the filter's window, or nothing at all.
+#pragma once
+
+#include "deep/denoise_data.h"
+#include "deep/guide.h"
+
+namespace fathom::deep {
+
+// What the tiles of a frame need. Decided per pixel and independent of tiles, so that bands of rows decide alike.
+struct Activity {
+  // 1: the pixel keeps its colours. It is empty, or the standard deviation of every pixel in the window is below a
+  // thousandth of its colour (or of a twentieth of the frame's mean colour, where that is more), which nobody sees.
+  Buffer<uint8_t> still;
+  // Bit c: component c has light in this pixel.
+  Buffer<uint8_t> light;
+};
+
+// `guides`: one per component. `level`: the mean colour of the frame.
+Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
+                      const DenoiseInputs& inputs, int radius, float level);
+
+// The components that a tile needs: bit c where a pixel is not still and component c has light within reach.
+unsigned activeComponents(const DenoiseData& data, const Activity& activity, const Box& tile, int radius);
+
+}  // namespace fathom::deep
