@@ -4,9 +4,12 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfTileDescription.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 
@@ -18,20 +21,28 @@ namespace {
 
 constexpr double kRowsPerBlock = 32;  // readers hold whole blocks of rows, PIZ's being the tallest in common use
 
-// Doubles, since windows may span all integers.
+// What a reader of one part holds at least. In doubles, since windows may span all integers.
 double decodedBytes(const Imf::Header& header) {
   const Imath::Box2i& window = header.dataWindow();
-  const double width = double(window.max.x) - window.min.x + 1, height = double(window.max.y) - window.min.y + 1;
+  double width = double(window.max.x) - window.min.x + 1;
+  double height = std::max(double(window.max.y) - window.min.y + 1, kRowsPerBlock);
+  if (header.hasTileDescription()) {
+    width = std::max(width, double(header.tileDescription().xSize));
+    height = std::max(height, double(header.tileDescription().ySize));
+  }
   double channels = 0;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) channels += 1;
-  // Of a deep part, which nothing here decodes, a reader holds the sample counts.
+  // Of a deep part, which is not decoded here, that is the sample counts.
   const bool deep = header.hasType() && Imf::isDeepData(header.type());
-  return width * std::max(height, kRowsPerBlock) * double(sizeof(float)) * (deep ? 1 : channels);
+  return width * height * double(sizeof(float)) * (deep ? 1 : channels);
 }
 
 }  // namespace
 
 bool isExr(const std::string& path) {
+  std::error_code unknown;
+  if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))
+    fail("{}: expected a file, found something else", path);
   std::ifstream file(path, std::ios::binary);
   if (!file) fail("{}: expected a readable file, found: {}", path, std::strerror(errno));
   char magic[4] = {};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <new>
 #include <vector>
 
 #include "flat/attribute_text.h"
@@ -17,9 +18,11 @@ namespace {
 
 constexpr int kBandRows = 64;  // a multiple of every EXR compression's block of rows
 
-// OpenImageIO's own words.
-std::string reason(const std::string& text) {
-  return text.empty() ? "no reason given" : oneLine(text);
+// OpenImageIO's own words, without the file's name, which every error begins with.
+std::string reason(std::string text, const std::string& path = {}) {
+  const std::string named = " from image file \"" + path + "\"";
+  if (const size_t at = text.find(named); at != text.npos) text.erase(at, named.size());
+  return text.empty() ? "no reason given" : oneLine(std::move(text));
 }
 
 std::unique_ptr<OIIO::ImageInput> openInput(const std::string& path, size_t memoryLimit) {
@@ -32,7 +35,7 @@ std::unique_ptr<OIIO::ImageInput> openInput(const std::string& path, size_t memo
   OIIO::ImageSpec spec;
   if (!input) fail("{}: expected an image file, found an unknown kind: {}", path, reason(OIIO::geterror()));
   if (!input->open(path, spec))
-    fail("{}: expected an image file, found a broken one: {}", path, reason(input->geterror()));
+    fail("{}: expected an image file, found a broken one: {}", path, reason(input->geterror(), path));
   return input;
 }
 
@@ -55,12 +58,14 @@ int findPart(OIIO::ImageInput& input, const std::string& path, const std::string
 }
 
 // Rows [y0, y1) of all channels, interleaved.
-void readRows(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec, int y0, int y1, float* values) {
-  const bool done = spec.tile_width
-                        ? input.read_tiles(part, 0, spec.x, spec.x + spec.width, y0, y1, spec.z, spec.z + 1, 0,
-                                           spec.nchannels, OIIO::TypeFloat, values)
-                        : input.read_scanlines(part, 0, y0, y1, spec.z, 0, spec.nchannels, OIIO::TypeFloat, values);
-  if (!done) fail("rows {} to {}: {}", y0, y1 - 1, reason(input.geterror()));
+void readRows(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec, int y0, int y1,
+              std::vector<float>& values) {
+  values.resize(size_t(y1 - y0) * size_t(spec.width) * size_t(spec.nchannels));
+  const bool done = spec.tile_width ? input.read_tiles(part, 0, spec.x, spec.x + spec.width, y0, y1, spec.z, spec.z + 1,
+                                                       0, spec.nchannels, OIIO::TypeFloat, values.data())
+                                    : input.read_scanlines(part, 0, y0, y1, spec.z, 0, spec.nchannels, OIIO::TypeFloat,
+                                                           values.data());
+  if (!done) throw Error(input.geterror());
 }
 
 // OpenImageIO maps integers to [0,1]; ids are wanted as they are.
@@ -88,6 +93,18 @@ Image emptyImage(const OIIO::ImageSpec& spec) {
               attributesOf(spec)};
   for (const std::string& name : spec.channelnames)
     image.planes.push_back({name, Buffer<float>(image.dataWindow.area())});
+  return image;
+}
+
+Image readPart(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec) {
+  Image image = emptyImage(spec);
+  std::vector<float> interleaved;
+  const int step = spec.tile_height ? spec.tile_height : kBandRows;
+  for (int y0 = spec.y; y0 < spec.y + spec.height; y0 += step) {
+    const int y1 = std::min(y0 + step, spec.y + spec.height);
+    readRows(input, part, spec, y0, y1, interleaved);
+    separate(interleaved, spec, size_t(y0 - spec.y) * size_t(spec.width), size_t(y1 - y0) * size_t(spec.width), image);
+  }
   return image;
 }
 
@@ -178,21 +195,14 @@ Image read(const std::string& path, const ReadOptions& options) {
   if (bytes > double(options.memoryLimit))
     fail("{}, part {}: expected at most {:.0f} MB of pixels, found a header that promises {:.0f} MB", path, part,
          double(options.memoryLimit) / 1e6, bytes / 1e6);
-  Image image = emptyImage(spec);
-  std::vector<float> interleaved;
-  const int step = spec.tile_height ? spec.tile_height : kBandRows;
-  for (int y0 = spec.y; y0 < spec.y + spec.height; y0 += step) {
-    const int y1 = std::min(y0 + step, spec.y + spec.height);
-    interleaved.resize(size_t(y1 - y0) * size_t(spec.width) * size_t(spec.nchannels));
-    try {
-      readRows(*input, part, spec, y0, y1, interleaved.data());
-    } catch (const Error& e) {
-      fail("{}, part {}: expected {} x {} pixels, found broken data in {}", path, part, spec.width, spec.height,
-           e.what());
-    }
-    separate(interleaved, spec, size_t(y0 - spec.y) * size_t(spec.width), size_t(y1 - y0) * size_t(spec.width), image);
+  try {
+    return readPart(*input, part, spec);
+  } catch (const Error& e) {
+    fail("{}, part {}: expected {} x {} pixels, found broken data: {}", path, part, spec.width, spec.height,
+         reason(e.what(), path));
+  } catch (const std::bad_alloc&) {
+    fail("{}, part {}: expected {:.0f} MB of memory for its pixels, found less", path, part, bytes / 1e6);
   }
-  return image;
 }
 
 void write(const std::string& path, const Image& image, const WriteOptions& options) {
