@@ -7,22 +7,16 @@
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfVecAttribute.h>
-#include <fmt/format.h>
 
 #include <optional>
 #include <set>
 #include <span>
 
+#include "flat/attribute_text.h"
+
 namespace fathom::deep {
 
 namespace {
-
-template <class T>
-std::string numbers(std::span<const T> values) {
-  std::string text;
-  for (const T value : values) text += fmt::format("{}{:#}", text.empty() ? "" : ", ", value);
-  return text;
-}
 
 // The text of an attribute that holds values of T one after the other.
 template <class Attribute, class T>
@@ -30,11 +24,13 @@ std::optional<std::string> textOf(const Imf::Attribute& attribute) {
   const auto* typed = dynamic_cast<const Attribute*>(&attribute);
   if (!typed) return {};
   static_assert(sizeof(typed->value()) % sizeof(T) == 0);
-  return numbers(std::span(reinterpret_cast<const T*>(&typed->value()), sizeof(typed->value()) / sizeof(T)));
+  return flat::attributeText(
+      std::span(reinterpret_cast<const T*>(&typed->value()), sizeof(typed->value()) / sizeof(T)));
 }
 
 std::optional<std::string> textOf(const Imf::Attribute& attribute) {
-  if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute)) return text->value();
+  if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute))
+    return flat::attributeText(text->value());
   for (const auto convert :
        {textOf<Imf::IntAttribute, int>, textOf<Imf::V2iAttribute, int>, textOf<Imf::V3iAttribute, int>,
         textOf<Imf::FloatAttribute, float>, textOf<Imf::V2fAttribute, float>, textOf<Imf::V3fAttribute, float>,

@@ -17,8 +17,8 @@
 
 #include "deep/exr_codec.h"
 #include "deep/exr_file.h"
-#include "deep/output_file.h"
 #include "flat/error.h"
+#include "flat/output_file.h"
 
 namespace fathom::deep {
 

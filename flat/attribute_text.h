@@ -1,18 +1,23 @@
-// The attributes of a file as text, and back with their types: what `flat::Image` carries from read to write.
+// The attributes of a file as text that keeps their type: how `flat::Image` carries them from read to write.
+//
+// "3" is an int, "3.0" a float, "1.0, 2.0" a vector of floats; all else is a string, and a string that would read as
+// one of the former stands in quotes.
 #pragma once
 
-#include <OpenImageIO/imageio.h>
-
-#include <map>
+#include <span>
 #include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 namespace fathom::flat {
 
-// Text keeps the type: "3" is an int, "3.0" a float, "1.0, 2.0" a vector of floats (2 to 4, or matrices of 9 and 16),
-// all else a string; a string that would read as one of the former stands in quotes. What describes the encoding of the
-// file is left out.
-std::map<std::string, std::string> attributesOf(const OIIO::ImageSpec& spec);
+std::string attributeText(std::span<const int> values);
+std::string attributeText(std::span<const float> values);
+std::string attributeText(std::string_view text);
 
-void addAttributes(const std::map<std::string, std::string>& attributes, OIIO::ImageSpec& spec);
+using AttributeValue = std::variant<std::vector<int>, std::vector<float>, std::string>;
+
+AttributeValue parseAttribute(std::string_view text);
 
 }  // namespace fathom::flat

@@ -1,16 +1,17 @@
 #include "flat/io.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <new>
 #include <vector>
 
-#include "flat/attribute_text.h"
 #include "flat/error.h"
 #include "flat/exr_size.h"
+#include "flat/oiio_attributes.h"
+#include "flat/output_file.h"
 
 namespace fathom::flat {
 
@@ -123,54 +124,31 @@ bool needsRange(std::string_view name) {
   return name == "Z" || name == "ZBack" || name.ends_with("samples") || name.find("variance") != name.npos;
 }
 
-// A file under a temporary name in the same folder, renamed when complete and removed when not.
-class PendingFile {
- public:
-  explicit PendingFile(std::string path) : path_(std::move(path)), temporary_(path_ + ".partial") {}
-  ~PendingFile() {
-    std::error_code ignored;
-    if (!done_) std::filesystem::remove(temporary_, ignored);
-  }
-  PendingFile(const PendingFile&) = delete;
-  PendingFile& operator=(const PendingFile&) = delete;
-
-  const std::string& temporary() const { return temporary_; }
-  void finish() {
-    std::error_code error;
-    std::filesystem::rename(temporary_, path_, error);
-    if (error) fail("{}: expected to be renamed into place, found {}", path_, error.message());
-    done_ = true;
-  }
-
- private:
-  std::string path_, temporary_;
-  bool done_ = false;
-};
-
 void writeBands(OIIO::ImageOutput& output, const OIIO::ImageSpec& spec, const Image& image) {
   std::vector<float> values;
   for (int y0 = spec.y; y0 < spec.y + spec.height; y0 += kBandRows) {
     const int y1 = std::min(y0 + kBandRows, spec.y + spec.height);
     interleave(image, y0, y1, values);
-    if (!output.write_scanlines(y0, y1, 0, OIIO::TypeFloat, values.data())) throw Error(reason(output.geterror()));
+    if (!output.write_scanlines(y0, y1, 0, OIIO::TypeFloat, values.data())) throw Error(output.geterror());
   }
 }
 
-// Writes `image` in the format `kind`, beside its place, and renames it.
+// Encodes `image` in the format `kind` in memory, and puts the file in its place.
 void writeAs(const char* kind, const std::string& path, const OIIO::ImageSpec& spec, const Image& image) {
   if (image.dataWindow.empty() || image.planes.empty())
     fail("{}: expected an image to write, found an empty one", path);
-  PendingFile file(path);
-  const auto output = OIIO::ImageOutput::create(kind);
+  OutputFile file(path);
+  OIIO::Filesystem::IOVecOutput bytes;
+  const auto output = OIIO::ImageOutput::create(kind, &bytes);
   if (!output) fail("{}: expected OpenImageIO to write {}, found: {}", path, kind, reason(OIIO::geterror()));
   try {
-    if (!output->open(file.temporary(), spec)) throw Error(reason(output->geterror()));
+    if (!output->open(path, spec)) throw Error(output->geterror());
     writeBands(*output, spec, image);
-    if (!output->close()) throw Error(reason(output->geterror()));
+    if (!output->close()) throw Error(output->geterror());
   } catch (const Error& e) {
-    output->close();
-    fail("{}: expected to be written, found: {}", path, e.what());
+    fail("{}: expected to be written, found: {}", path, reason(e.what(), path));
   }
+  file.append(bytes.buffer());
   file.finish();
 }
 

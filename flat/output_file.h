@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-namespace fathom::deep {
+namespace fathom {
 
 class OutputFile {
  public:
@@ -28,4 +28,4 @@ class OutputFile {
   uint64_t size_ = 0;
 };
 
-}  // namespace fathom::deep
+}  // namespace fathom

@@ -1,4 +1,4 @@
-#include "deep/output_file.h"
+#include "flat/output_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -11,7 +11,7 @@
 
 #include "flat/error.h"
 
-namespace fathom::deep {
+namespace fathom {
 
 namespace {
 
@@ -67,4 +67,4 @@ void OutputFile::finish() {
   }
 }
 
-}  // namespace fathom::deep
+}  // namespace fathom
