@@ -5,17 +5,29 @@
 #include <string>
 
 #include "deep/io.h"
+#include "flat/error.h"
 
 namespace fathom::cli {
 
-// Calls body with one band of the part after the other, from the top, each of about 256 MB at most when decoded, and
-// of one row (or of one row of tiles) at least. An Error that the body throws is put behind the name of the file.
-void forEachBand(const std::string& path, deep::Reader& reader, const std::function<void(deep::DeepImage band)>& body);
+// Calls body with one band of rows after the other, from the top; each takes at most `bandBytes` where more than one
+// row (or one row of tiles) does.
+void forEachBand(deep::Reader& reader, const std::function<void(deep::DeepImage band)>& body,
+                 size_t bandBytes = size_t(256) << 20);
 
 // The same windows, attributes and channels without rows: what a command makes of it is the layout of its output.
 deep::DeepImage readLayout(deep::Reader& reader);
 
 // How the part was stored, and the file's other parts, for an output that replaces it.
 deep::WriteOptions likeInput(const std::string& path, const deep::PartInfo& part);
+
+// What the operation returns; an Error of its own is put behind the name of the file that it works on.
+template <class Operation>
+auto about(const std::string& path, const Operation& operation) {
+  try {
+    return operation();
+  } catch (const Error& e) {
+    fail("{}: {}", path, e.what());
+  }
+}
 
 }  // namespace fathom::cli

@@ -26,30 +26,27 @@ struct ClusterCommand {
 // Where the bins of a band lie.
 class LayoutSource {
  public:
-  LayoutSource(const ClusterCommand& command, const deep::PartInfo& part) : params_(command.params) {
-    if (!command.prepass.empty()) {
-      prepass_.emplace(command.prepass, deep::ReadOptions{.part = {}, .channels = [](const std::string& name) {
-                                                            return name == "Z" || name == "ZBack" || name == "A";
-                                                          }});
-      return;
-    }
-    try {
-      ppuScale_ = command.ppuScale > 0 ? command.ppuScale : deep::findPpuScale(part.attributes, part.displayWindow);
-    } catch (const Error& e) {
-      fail("{}: {}", command.input, e.what());
-    }
+  LayoutSource(const ClusterCommand& command, const deep::PartInfo& part)
+      : command_(command), ppuScale_(command.ppuScale) {
+    if (!command.prepass.empty())
+      prepass_.emplace(command.prepass, deep::ReadOptions{.part = {}, .channels = isGeometry});
+    else if (ppuScale_ == 0)
+      ppuScale_ = about(command.input, [&] { return deep::findPpuScale(part.attributes, part.displayWindow); });
   }
 
   deep::BinLayout of(const deep::DeepImage& band) {
-    if (!prepass_) return deep::findBins(band, ppuScale_, params_);
+    if (!prepass_) return about(command_.input, [&] { return deep::findBins(band, ppuScale_, command_.params); });
     const Box& rows = prepass_->part().dataWindow;
     const int y0 = std::clamp(band.dataWindow.y0, rows.y0, rows.y1), y1 = std::clamp(band.dataWindow.y1, y0, rows.y1);
-    return deep::layoutFrom(prepass_->read(y0, y1));
+    const deep::DeepImage prepass = prepass_->read(y0, y1);
+    return about(command_.prepass, [&] { return deep::layoutFrom(prepass); });
   }
 
  private:
-  deep::ClusterParams params_;
-  float ppuScale_ = 0;
+  static bool isGeometry(const std::string& name) { return name == "Z" || name == "ZBack" || name == "A"; }
+
+  const ClusterCommand& command_;
+  float ppuScale_;
   std::optional<deep::Reader> prepass_;
 };
 
@@ -65,19 +62,22 @@ size_t countLost(const deep::DeepImage& samples, const deep::BinLayout& layout) 
 void runCluster(const ClusterCommand& command) {
   deep::Reader reader(command.input, {.part = command.part, .channels = {}});
   LayoutSource layouts(command, reader.part());
-  deep::DeepImage head = readLayout(reader);
-  head = deep::cluster(head, layouts.of(head));
+  const auto clustered = [&](const deep::DeepImage& band, const deep::BinLayout& layout) {
+    return about(command.input, [&] { return deep::cluster(band, layout); });
+  };
+  const deep::DeepImage input = readLayout(reader);
+  deep::DeepImage head = clustered(input, layouts.of(input));
   if (command.ppuScale > 0) head.attributes.set("fathom:ppuScale", command.ppuScale);
   const deep::PartInfo& part = reader.part();
   deep::Writer writer(command.output, head, part.dataWindow, likeInput(command.input, part));
   size_t samples = 0, bins = 0, lost = 0;
-  forEachBand(command.input, reader, [&](const deep::DeepImage& band) {
+  forEachBand(reader, [&](const deep::DeepImage& band) {
     const deep::BinLayout layout = layouts.of(band);
-    const deep::DeepImage clustered = deep::cluster(band, layout);
+    const deep::DeepImage result = clustered(band, layout);
     samples += band.samples();
-    bins += clustered.samples();
+    bins += result.samples();
     lost += countLost(band, layout);
-    writer.write(clustered);
+    writer.write(result);
   });
   writer.finish();
   fmt::print("{}: {} bins of {} samples, {:.2f} bins per pixel\n", command.output, bins, samples,

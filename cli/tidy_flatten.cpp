@@ -33,7 +33,9 @@ bool isDepth(const std::string& name) {
 deep::Untidiness findUntidiness(const FileParams& params) {
   deep::Reader reader(params.input, {.part = params.part, .channels = isDepth});
   deep::Untidiness untidiness;
-  forEachBand(params.input, reader, [&](const deep::DeepImage& band) { untidiness |= deep::findUntidiness(band); });
+  forEachBand(reader, [&](const deep::DeepImage& band) {
+    untidiness |= about(params.input, [&] { return deep::findUntidiness(band); });
+  });
   return untidiness;
 }
 
@@ -46,10 +48,10 @@ void runTidy(const FileParams& params) {
   if (untidiness.any()) layout.attributes.erase("deepImageState");
   deep::Writer writer(params.output, layout, reader.part().dataWindow, likeInput(params.input, reader.part()));
   size_t before = 0, after = 0;
-  forEachBand(params.input, reader, [&](deep::DeepImage band) {
+  forEachBand(reader, [&](deep::DeepImage band) {
     before += band.samples();
     if (merges) deep::dropSampleStatistics(band);
-    const deep::DeepImage tidied = deep::tidy(std::move(band)).image;
+    const deep::DeepImage tidied = about(params.input, [&] { return deep::tidy(std::move(band)).image; });
     after += tidied.samples();
     writer.write(tidied);
   });
@@ -61,11 +63,11 @@ void runTidy(const FileParams& params) {
 
 void runFlatten(const FileParams& params) {
   deep::Reader reader(params.input, {.part = params.part, .channels = {}});
-  flat::Image result = deep::flatten(readLayout(reader));
+  flat::Image result = about(params.input, [&] { return deep::flatten(readLayout(reader)); });
   result.dataWindow = reader.part().dataWindow;
   for (flat::Plane& plane : result.planes) plane.values = Buffer<float>(result.dataWindow.area());
-  forEachBand(params.input, reader, [&](const deep::DeepImage& band) {
-    const flat::Image rows = deep::flatten(band);
+  forEachBand(reader, [&](const deep::DeepImage& band) {
+    const flat::Image rows = about(params.input, [&] { return deep::flatten(band); });
     const size_t first = result.dataWindow.index(band.dataWindow.x0, band.dataWindow.y0);
     for (size_t c = 0; c < rows.planes.size(); ++c)
       std::copy(rows.planes[c].values.begin(), rows.planes[c].values.end(), result.planes[c].values.begin() + first);
