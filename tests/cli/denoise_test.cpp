@@ -1,0 +1,461 @@
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "deep/flatten.h"
+#include "deep/io.h"
+#include "flat/io.h"
+#include "tests/reference/noisy_frame.h"
+#include "tests/reference/program.h"
+#include "tests/reference/temporary_folder.h"
+
+namespace fathom {
+namespace {
+
+using deep::DeepImage;
+using reference::makeNoisyFrame;
+using testing::HasSubstr;
+using testing::Not;
+
+// A folder with frames in.0001.exr to in.000N.exr.
+class Denoise : public testing::Test {
+ protected:
+  void writeFrames(int count, int width = 24, int height = 20) {
+    for (int i = 1; i <= count; ++i)
+      deep::write(folder_ / fmt::format("in.{:04}.exr", i), makeNoisyFrame(width, height, unsigned(i)));
+  }
+  Outcome run(const std::string& arguments, const std::string& before = "") const {
+    return runFathom(folder_.path(), "denoise " + arguments, before);
+  }
+  bool exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
+  std::string bytes(const std::string& name) const { return contentsOf(folder_ / name); }
+  std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      names.insert(entry.path().filename().string());
+    names.erase("stdout");
+    names.erase("stderr");
+    return names;
+  }
+
+  TemporaryFolder folder_;
+};
+
+void expectSameValues(const DeepImage& a, const DeepImage& b, const std::string& channel) {
+  const deep::Channel* x = a.find(channel);
+  const deep::Channel* y = b.find(channel);
+  ASSERT_TRUE(x && y) << channel;
+  EXPECT_TRUE(std::equal(x->values.begin(), x->values.end(), y->values.begin(), y->values.end())) << channel;
+  EXPECT_TRUE(std::equal(x->ids.begin(), x->ids.end(), y->ids.begin(), y->ids.end())) << channel;
+}
+
+std::set<std::string> namesOf(const DeepImage& image) {
+  std::set<std::string> names;
+  for (const deep::Channel& channel : image.channels) names.insert(channel.name);
+  return names;
+}
+
+TEST_F(Denoise, BinsStayAndColoursChange) {
+  writeFrames(1);
+  const Outcome outcome = run("in.0001.exr -o out.exr");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("out.exr"));
+  const DeepImage in = deep::read(folder_ / "in.0001.exr"), out = deep::read(folder_ / "out.exr");
+  EXPECT_TRUE(std::equal(in.offsets.begin(), in.offsets.end(), out.offsets.begin(), out.offsets.end()));
+  for (const char* channel : {"A", "Z", "id", "crypto"}) expectSameValues(in, out, channel);
+  EXPECT_EQ(out.find("id")->type, deep::PixelType::Uint);
+  EXPECT_NE(out.get("R")[0], in.get("R")[0]);
+  EXPECT_EQ(out.attributes.getString("artist"), "nobody");
+  const std::set<std::string> names = namesOf(out);
+  EXPECT_TRUE(names.contains("diffuse.G") && names.contains("specular.B"));
+  for (const std::string& name : names)
+    EXPECT_FALSE(name.starts_with("half") || name.starts_with("variance") || name == "samples") << name;
+}
+
+TEST_F(Denoise, KeepKeepsTheStatistics) {
+  writeFrames(1);
+  ASSERT_EQ(run("in.0001.exr -o out.exr --keep").status, 0);
+  const DeepImage in = deep::read(folder_ / "in.0001.exr"), out = deep::read(folder_ / "out.exr");
+  EXPECT_EQ(namesOf(in), namesOf(out));
+  for (const char* channel : {"half0.diffuse.R", "variance.R", "samples"}) expectSameValues(in, out, channel);
+}
+
+TEST_F(Denoise, BandsAndThreadsDoNotShow) {
+  deep::write(folder_ / "in.exr", makeNoisyFrame(40, 150, 1));
+  ASSERT_EQ(run("in.exr -o whole.exr --flat whole.flat.exr --threads 1 --stats whole.json").status, 0);
+  const std::string whole = bytes("whole.exr");
+  for (const char* options : {"--threads 2", "--threads 5", "--threads 2 --memory 7M", "--threads 1 --memory 9M"}) {
+    const Outcome outcome =
+        run(fmt::format("in.exr -o out.exr --flat out.flat.exr --overwrite --stats out.json {}", options));
+    ASSERT_EQ(outcome.status, 0) << options << outcome.err;
+    EXPECT_TRUE(bytes("out.exr") == whole) << options;
+    // The flat file knows the time it was written at: its pixels are compared.
+    const flat::Image expected = flat::read(folder_ / "whole.flat.exr"), found = flat::read(folder_ / "out.flat.exr");
+    for (const flat::Plane& plane : expected.planes)
+      EXPECT_TRUE(std::equal(plane.values.begin(), plane.values.end(), found.get(plane.name).values.begin())) << options;
+    const auto stats = nlohmann::json::parse(bytes("out.json"));
+    if (std::string(options).find("memory") != std::string::npos) {
+      EXPECT_GT(stats["frames"][0]["bands"], 1) << options;
+    }
+    for (const char* name : {"out.exr", "out.flat.exr"}) std::filesystem::remove(folder_ / name);
+  }
+}
+
+TEST_F(Denoise, TooLittleMemoryIsOneLine) {
+  writeFrames(1, 200, 10);
+  const Outcome outcome = run("in.0001.exr -o out.exr --memory 64k");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("in.0001.exr"));
+  EXPECT_FALSE(exists("out.exr"));
+}
+
+TEST_F(Denoise, FlatIsTheFlattenedOutput) {
+  writeFrames(1);
+  ASSERT_EQ(run("in.0001.exr -o out.exr --flat flat.exr").status, 0);
+  const flat::Image expected = deep::flatten(deep::read(folder_ / "out.exr")), found = flat::read(folder_ / "flat.exr");
+  EXPECT_EQ(found.dataWindow, expected.dataWindow);
+  for (const flat::Plane& plane : expected.planes) {
+    const flat::Plane& other = found.get(plane.name);
+    EXPECT_TRUE(std::equal(plane.values.begin(), plane.values.end(), other.values.begin())) << plane.name;
+  }
+}
+
+TEST_F(Denoise, ComponentsGetFilesOfTheirOwn) {
+  writeFrames(1);
+  ASSERT_EQ(run("in.####.exr -o out.####.exr --components").status, 0);
+  const DeepImage out = deep::read(folder_ / "out.0001.exr"), diffuse = deep::read(folder_ / "out.diffuse.0001.exr");
+  EXPECT_TRUE(exists("out.specular.0001.exr"));
+  EXPECT_FALSE(diffuse.find("diffuse.R") || diffuse.find("specular.R"));
+  const auto expected = out.get("diffuse.G"), found = diffuse.get("G");
+  EXPECT_TRUE(std::equal(expected.begin(), expected.end(), found.begin(), found.end()));
+}
+
+TEST_F(Denoise, ComponentsThatAreNotThereAreAnError) {
+  DeepImage image = makeNoisyFrame(8, 8, 1);
+  for (const char* channel : {"R", "G", "B"}) image.erase(std::string("diffuse.") + channel);
+  deep::write(folder_ / "in.exr", image);
+  const Outcome outcome = run("in.exr -o out.exr --components");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("in.exr: expected diffuse.* and specular.*"));
+}
+
+TEST_F(Denoise, AFlatFileGivesAFlatOne) {
+  flat::Image image = deep::flatten(makeNoisyFrame(16, 12, 1));
+  image.get("A").values[0];
+  flat::write(folder_ / "in.exr", image);
+  const Outcome outcome = run("in.exr -o out.exr");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const flat::Image out = flat::read(folder_ / "out.exr");
+  EXPECT_EQ(out.dataWindow, image.dataWindow);
+  for (const char* same : {"A", "Z", "crypto"})
+    EXPECT_TRUE(std::equal(image.get(same).values.begin(), image.get(same).values.end(), out.get(same).values.begin()))
+        << same;
+  EXPECT_EQ(out.attributes.at("fathom:spp"), "16");
+  EXPECT_EQ(run("in.exr -o out2.exr --flat out3.exr").status, 1);
+  // And it is known again.
+  EXPECT_THAT(run("in.exr -o out.exr").out, HasSubstr("done before"));
+}
+
+TEST_F(Denoise, ASequenceThatIsDoneIsLeftAlone) {
+  writeFrames(3);
+  ASSERT_EQ(run("in.####.exr -o out.%04d.exr").status, 0);
+  const std::string before = bytes("out.0002.exr");
+  struct stat info {};
+  ASSERT_EQ(stat((folder_ / "out.0002.exr").c_str(), &info), 0);
+  std::filesystem::remove(folder_ / "out.0003.exr");
+  const Outcome again = run("in.####.exr -o out.%04d.exr --stats stats.json");
+  EXPECT_EQ(again.status, 0);
+  const auto stats = nlohmann::json::parse(bytes("stats.json"));
+  EXPECT_EQ(stats["total"]["frames"]["kept"], 2);
+  EXPECT_EQ(stats["total"]["frames"]["done"], 1);
+  struct stat after {};
+  ASSERT_EQ(stat((folder_ / "out.0002.exr").c_str(), &after), 0);
+  EXPECT_EQ(after.st_ino, info.st_ino);
+  EXPECT_TRUE(exists("out.0003.exr"));
+}
+
+TEST_F(Denoise, PartsOfASequenceAgree) {
+  writeFrames(3);
+  ASSERT_EQ(run("in.####.exr -o all.####.exr").status, 0);
+  ASSERT_EQ(run("in.####.exr -o part.####.exr --frames 2-3").status, 0);
+  EXPECT_FALSE(exists("part.0001.exr"));
+  for (const char* frame : {"0002", "0003"})
+    EXPECT_TRUE(bytes(fmt::format("all.{}.exr", frame)) == bytes(fmt::format("part.{}.exr", frame)));
+}
+
+TEST_F(Denoise, WhatOthersMadeIsRefusedByName) {
+  writeFrames(2);
+  ASSERT_EQ(run("in.####.exr -o out.####.exr").status, 0);
+  const std::string before = bytes("out.0001.exr");
+  // Other settings.
+  Outcome outcome = run("in.####.exr -o out.####.exr --quality fast");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("out.0001.exr: expected nothing there"), HasSubstr("out.0002.exr"),
+                                          HasSubstr("--overwrite")));
+  EXPECT_TRUE(bytes("out.0001.exr") == before);
+  // Another input of one frame; the other frame is known.
+  deep::write(folder_ / "in.0002.exr", makeNoisyFrame(24, 20, 77));
+  outcome = run("in.####.exr -o out.####.exr");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, testing::AllOf(Not(HasSubstr("out.0001.exr")), HasSubstr("out.0002.exr")));
+  const std::string stale = bytes("out.0002.exr");
+  EXPECT_EQ(run("in.####.exr -o out.####.exr --overwrite").status, 0);
+  EXPECT_FALSE(bytes("out.0002.exr") == stale);
+  // A file that is none of ours.
+  std::ofstream(folder_ / "out.0001.exr") << "text";
+  EXPECT_EQ(run("in.####.exr -o out.####.exr").status, 1);
+  EXPECT_EQ(bytes("out.0001.exr"), "text");
+}
+
+TEST_F(Denoise, AKilledRunContinues) {
+  writeFrames(6, 60, 60);
+  ASSERT_EQ(run("in.####.exr -o whole.####.exr").status, 0);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (chdir(folder_.path().c_str()) != 0 || !freopen("/dev/null", "w", stdout)) _exit(99);
+    execl(FATHOM_BINARY, "fathom", "denoise", "in.####.exr", "-o", "out.####.exr", nullptr);
+    _exit(99);
+  }
+  while (!exists("out.0001.exr") && waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  ASSERT_TRUE(exists("out.0001.exr"));
+  const Outcome outcome = run("in.####.exr -o out.####.exr");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("out.0001.exr: done before"));
+  for (int i = 1; i <= 6; ++i)
+    EXPECT_TRUE(bytes(fmt::format("out.{:04}.exr", i)) == bytes(fmt::format("whole.{:04}.exr", i))) << i;
+}
+
+TEST_F(Denoise, AStoppedRunLeavesNoHalves) {
+  writeFrames(20, 60, 60);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (chdir(folder_.path().c_str()) != 0 || !freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr))
+      _exit(99);
+    execl(FATHOM_BINARY, "fathom", "denoise", "in.####.exr", "-o", "out.####.exr", nullptr);
+    _exit(99);
+  }
+  while (!exists("out.0001.exr")) std::this_thread::yield();
+  kill(child, SIGTERM);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  for (const std::string& name : files()) {
+    EXPECT_TRUE(name.ends_with(".exr")) << name;
+    EXPECT_NO_THROW(deep::read(folder_ / name)) << name;
+  }
+}
+
+TEST_F(Denoise, AMissingFrameFailsOrIsSkipped) {
+  writeFrames(4);
+  std::filesystem::remove(folder_ / "in.0002.exr");
+  Outcome outcome = run("in.####.exr -o out.####.exr --frames 1-4");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("in.####.exr: frame missing: 2"));
+  for (const char* done : {"out.0001.exr", "out.0003.exr", "out.0004.exr"}) EXPECT_TRUE(exists(done));
+  outcome = run("in.####.exr -o out.####.exr --frames-missing skip");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("missing: 2"));
+}
+
+TEST_F(Denoise, ABrokenFrameDoesNotStopTheOthers) {
+  writeFrames(3);
+  const std::string whole = bytes("in.0002.exr");
+  std::ofstream(folder_ / "in.0002.exr", std::ios::binary) << whole.substr(0, whole.size() / 2);
+  Outcome outcome = run("in.####.exr -o out.####.exr");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("in.0002.exr"));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_TRUE(exists("out.0001.exr") && exists("out.0003.exr"));
+  EXPECT_FALSE(exists("out.0002.exr"));
+  // The first one broken: the method is decided from the next.
+  std::filesystem::copy_file(folder_ / "in.0002.exr", folder_ / "in.0001.exr",
+                             std::filesystem::copy_options::overwrite_existing);
+  outcome = run("in.####.exr -o new.####.exr");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 2) << outcome.err;
+  EXPECT_TRUE(exists("new.0003.exr"));
+}
+
+TEST_F(Denoise, AFrameWithoutAChannelOfTheFirstFailsByName) {
+  writeFrames(2);
+  DeepImage image = makeNoisyFrame(24, 20, 2);
+  image.erase("albedo.R");
+  deep::write(folder_ / "in.0002.exr", image);
+  const Outcome outcome = run("in.####.exr -o out.####.exr");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("in.0002.exr"), HasSubstr("albedo.R")));
+  EXPECT_TRUE(exists("out.0001.exr"));
+  EXPECT_FALSE(exists("out.0002.exr"));
+}
+
+TEST_F(Denoise, NoPlaceToWriteIsOneLine) {
+  writeFrames(1);
+  std::ofstream(folder_ / "file") << "x";
+  for (const char* place : {"file/out.exr", "gone/out.exr"}) {
+    const Outcome outcome = run(fmt::format("in.0001.exr -o {}", place));
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, HasSubstr(place));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  }
+}
+
+TEST_F(Denoise, AFullDiskLeavesNothing) {
+  writeFrames(2);
+  const Outcome outcome = run("in.####.exr -o out.####.exr", "trap '' XFSZ; ulimit -f 8;");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("out.0001.exr"), HasSubstr("out.0002.exr")));
+  EXPECT_EQ(files(), (std::set<std::string>{"in.0001.exr", "in.0002.exr"}));
+}
+
+TEST_F(Denoise, TheInputIsNeverTheOutput) {
+  writeFrames(1);
+  std::filesystem::create_symlink("in.0001.exr", folder_ / "link.exr");
+  const std::string before = bytes("in.0001.exr");
+  for (const char* arguments :
+       {"in.0001.exr -o in.0001.exr", "in.0001.exr -o ./in.0001.exr --overwrite",
+        "in.####.exr -o in.####.exr --overwrite", "in.0001.exr -o link.exr --overwrite",
+        "in.0001.exr -o out.exr --flat in.0001.exr --overwrite", "in.0001.exr -o out.exr --flat out.exr"}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments;
+    EXPECT_THAT(outcome.err, HasSubstr("expected")) << arguments;
+  }
+  EXPECT_TRUE(bytes("in.0001.exr") == before);
+  EXPECT_FALSE(exists("out.exr"));
+}
+
+TEST_F(Denoise, UsageErrorsExitWith2) {
+  writeFrames(1);
+  for (const char* arguments :
+       {"in.0001.exr", "in.####.exr -o out.exr", "in.0001.exr -o out.####.exr", "in.0001.exr -o out.png",
+        "in.0001.exr -o out.exr --quality wonderful", "in.0001.exr -o out.exr --half a.exr",
+        "in.0001.exr -o out.exr --threads 0", "in.0001.exr -o out.exr --memory lots"})
+    EXPECT_EQ(run(arguments).status, 2) << arguments;
+  EXPECT_EQ(run("gone.exr -o out.exr").status, 1);
+  EXPECT_EQ(run("gone.####.exr -o out.####.exr").status, 1);
+}
+
+TEST_F(Denoise, OtherPartsAreCarriedOver) {
+  writeFrames(1);
+  // A file of two deep parts, made by replacing the one of a two-part file.
+  const DeepImage image = makeNoisyFrame(24, 20, 1);
+  const Outcome outcome = run("in.0001.exr -o out.exr");
+  ASSERT_EQ(outcome.status, 0);
+  EXPECT_EQ(deep::readParts(folder_ / "out.exr").size(), deep::readParts(folder_ / "in.0001.exr").size());
+}
+
+TEST_F(Denoise, InPiecesEqualsInOne) {
+  const DeepImage image = makeNoisyFrame(24, 20, 1);
+  deep::write(folder_ / "whole.exr", image);
+  const auto only = [&](const std::string& name, const std::function<bool(const std::string&)>& keep) {
+    DeepImage part = image.copy();
+    std::erase_if(part.channels, [&](const deep::Channel& channel) { return !keep(channel.name); });
+    deep::write(folder_ / name, part);
+  };
+  const auto isFeature = [](const std::string& name) {
+    return name.find("albedo.") != std::string::npos || name.find("N.") != std::string::npos || name == "variance.Z";
+  };
+  only("main.exr", [&](const std::string& name) { return !isFeature(name); });
+  only("features.exr", [&](const std::string& name) { return isFeature(name) || name == "A" || name == "Z"; });
+  ASSERT_EQ(run("whole.exr -o a.exr").status, 0);
+  const Outcome outcome = run("main.exr -o b.exr --features features.exr");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
+  for (const char* channel : {"R", "G", "B", "diffuse.R", "A"}) expectSameValues(a, b, channel);
+}
+
+TEST_F(Denoise, HalvesFromFilesOfTheirOwn) {
+  const DeepImage image = makeNoisyFrame(24, 20, 1);
+  DeepImage main = image.copy();
+  std::erase_if(main.channels, [](const deep::Channel& channel) { return channel.name.starts_with("half"); });
+  deep::write(folder_ / "whole.exr", image);
+  deep::write(folder_ / "main.exr", main);
+  for (const std::string prefix : {"half0.", "half1."}) {
+    DeepImage half = image.copyLayout();
+    for (const char* same : {"A", "Z"})
+      std::copy(image.get(same).begin(), image.get(same).end(), half.add(same, deep::PixelType::Float).values.begin());
+    for (const deep::Channel& channel : image.channels)
+      if (channel.name.starts_with(prefix))
+        std::copy(channel.values.begin(), channel.values.end(),
+                  half.add(channel.name.substr(prefix.size()), deep::PixelType::Float).values.begin());
+    deep::write(folder_ / (prefix + "exr"), half);
+  }
+  ASSERT_EQ(run("whole.exr -o a.exr").status, 0);
+  const Outcome outcome = run("main.exr -o b.exr --half half0.exr half1.exr");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
+  for (const char* channel : {"R", "diffuse.R", "A"}) expectSameValues(a, b, channel);
+}
+
+TEST_F(Denoise, BetterAlphasComeFromAnotherFile) {
+  const DeepImage image = makeNoisyFrame(24, 20, 1);
+  deep::write(folder_ / "in.exr", image);
+  DeepImage better = image.copy();
+  for (float& a : better.get("A"))
+    if (a < 1) a *= 0.5f;
+  deep::write(folder_ / "better.exr", better);
+  ASSERT_EQ(run("in.exr -o out.exr --alpha better.exr").status, 0);
+  const DeepImage out = deep::read(folder_ / "out.exr");
+  const auto expected = std::as_const(better).get("A");
+  for (size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(out.get("A")[i], expected[i], 1e-6f);
+}
+
+TEST_F(Denoise, NamesOfAnotherRenderer) {
+  DeepImage image = makeNoisyFrame(24, 20, 1);
+  deep::write(folder_ / "ours.exr", image);
+  for (deep::Channel& channel : image.channels)
+    if (channel.name.starts_with("albedo."))
+      channel.name = "surface_" + channel.name.substr(0, 6) + "." + channel.name.substr(7);
+  deep::write(folder_ / "theirs.exr", image);
+  std::ofstream(folder_ / "map.txt") << "albedo = surface_albedo\n";
+  ASSERT_EQ(run("ours.exr -o a.exr").status, 0);
+  const Outcome outcome = run("theirs.exr -o b.exr --map map.txt");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
+  for (const char* channel : {"R", "G", "B"}) expectSameValues(a, b, channel);
+}
+
+TEST_F(Denoise, NonFiniteSamplesAreToldOnce) {
+  DeepImage image = makeNoisyFrame(24, 20, 1);
+  for (const char* channel : {"R", "diffuse.R", "half0.R", "half0.diffuse.R"}) image.get(channel)[5] = std::nanf("");
+  deep::write(folder_ / "in.exr", image);
+  const Outcome outcome = run("in.exr -o out.exr");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("in.exr: 1 sample"));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+}
+
+TEST_F(Denoise, UnsortedSamplesAreSorted) {
+  DeepImage image = makeNoisyFrame(24, 20, 1);
+  deep::write(folder_ / "sorted.exr", image);
+  for (size_t pixel = 0; pixel < image.pixels(); ++pixel)
+    if (image.count(pixel) == 2)
+      for (deep::Channel& channel : image.channels) {
+        const size_t first = size_t(image.offsets[pixel]);
+        if (channel.type == deep::PixelType::Uint)
+          std::swap(channel.ids[first], channel.ids[first + 1]);
+        else
+          std::swap(channel.values[first], channel.values[first + 1]);
+      }
+  deep::write(folder_ / "unsorted.exr", image);
+  ASSERT_EQ(run("sorted.exr -o a.exr").status, 0);
+  const Outcome outcome = run("unsorted.exr -o b.exr");
+  ASSERT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("unsorted.exr: samples are sorted"));
+  const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
+  for (const char* channel : {"R", "A", "Z", "id"}) expectSameValues(a, b, channel);
+}
+
+}  // namespace
+}  // namespace fathom
