@@ -11,7 +11,19 @@
 namespace fathom::cli {
 
 void ContentHash::addBytes(const char* bytes, size_t size) {
-  for (size_t i = 0; i < size; ++i) value_ = (value_ ^ uint8_t(bytes[i])) * 0x100000001b3;
+  std::array<uint64_t, 4> lanes = lanes_;
+  size_t i = 0;
+  for (; i + 4 <= size; i += 4)
+    for (size_t lane = 0; lane < 4; ++lane) lanes[lane] = (lanes[lane] ^ uint8_t(bytes[i + lane])) * kPrime;
+  for (size_t lane = 0; i + lane < size; ++lane) lanes[lane] = (lanes[lane] ^ uint8_t(bytes[i + lane])) * kPrime;
+  lanes_ = lanes;
+}
+
+uint64_t ContentHash::value() const {
+  uint64_t value = kStart;
+  for (const uint64_t lane : lanes_)
+    for (int shift = 0; shift < 64; shift += 8) value = (value ^ (lane >> shift & 0xff)) * kPrime;
+  return value;
 }
 
 void ContentHash::add(std::string_view text) {

@@ -2,24 +2,28 @@
 // work.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
 
 namespace fathom::cli {
 
-// FNV-1a, 64 bits. Every piece is preceded by its length, so that pieces do not run into one another.
+// FNV-1a, 64 bits, in four lanes that take the bytes in turns: the multiplications of one byte need not wait for those
+// of the last. Every piece is preceded by its length, so that pieces do not run into one another.
 class ContentHash {
  public:
   void add(std::string_view text);
   // The bytes of a file; throws Error where it cannot be read.
   void addFile(const std::string& path);
-  uint64_t value() const { return value_; }
+  uint64_t value() const;
 
  private:
+  static constexpr uint64_t kStart = 0xcbf29ce484222325, kPrime = 0x100000001b3;
+
   void addBytes(const char* bytes, size_t size);
 
-  uint64_t value_ = 0xcbf29ce484222325;
+  std::array<uint64_t, 4> lanes_ = {kStart, kStart, kStart, kStart};
 };
 
 }  // namespace fathom::cli

@@ -136,9 +136,10 @@ int64_t peakMemory() {
   return int64_t(usage.ru_maxrss) * 1024;
 }
 
-void writeStats(const std::string& path, const DenoiseJob& job, const std::vector<FrameReport>& reports) {
+void writeStats(const std::string& path, const std::vector<DenoiseFrame>& frames,
+                const std::vector<FrameReport>& reports) {
   using Json = nlohmann::ordered_json;
-  Json frames = Json::array();
+  Json list = Json::array();
   deep::DenoiseStats total;
   std::map<std::string, int> statuses = {{"done", 0}, {"kept", 0}, {"failed", 0}};
   for (size_t i = 0; i < reports.size(); ++i) {
@@ -147,19 +148,16 @@ void writeStats(const std::string& path, const DenoiseJob& job, const std::vecto
                          : report.status == FrameReport::Status::Kept ? "kept"
                                                                       : "failed";
     ++statuses[status];
-    Json frame = {{"input", job.frames[i].inputs.main},
-                  {"output", job.frames[i].outputs.image},
-                  {"status", status},
-                  {"bands", report.bands},
-                  {"seconds", report.stats.seconds},
-                  {"counts", report.stats.counts}};
+    Json frame = {
+        {"input", frames[i].inputs.main}, {"output", frames[i].outputs.image}, {"status", status},
+        {"bands", report.bands},          {"seconds", report.stats.seconds},   {"counts", report.stats.counts}};
     if (!report.error.empty()) frame["error"] = report.error;
-    frames.push_back(std::move(frame));
+    list.push_back(std::move(frame));
     for (const auto& [stage, seconds] : report.stats.seconds) total.seconds[stage] += seconds;
     for (const auto& [what, count] : report.stats.counts) total.counts[what] += count;
   }
   const Json root = {{"version", FATHOM_VERSION},
-                     {"frames", std::move(frames)},
+                     {"frames", std::move(list)},
                      {"total", {{"frames", statuses}, {"seconds", total.seconds}, {"counts", total.counts}}},
                      {"peakMemory", peakMemory()}};
   std::ofstream file(path);
@@ -197,7 +195,7 @@ void runDenoise(const DenoiseCommand& command) {
     for (const int frame : framesOnDisk(sequence.pattern)) candidates.push_back(inputsAt(command, frame));
   else
     candidates.push_back(job.frames.front().inputs);
-  job.plan = planSequence(candidates, job.source, paramsOf(command));
+  job.plan = planSequence(candidates, job.source, paramsOf(command), job.frames.front().inputs.main);
   if (!job.plan.deep && !command.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", command.input);
   if (command.components && !job.plan.denoise.inputs.components)
@@ -205,12 +203,13 @@ void runDenoise(const DenoiseCommand& command) {
   for (const std::string& note : job.plan.notes) fmt::print(stderr, "{}\n", note);
 
   const bool missing = reportMissing(command, sequence);
+  const std::vector<DenoiseFrame> frames = job.frames;
   std::vector<FrameReport> reports;
   {
-    ProgressDisplay display(job.frames.size());
-    reports = denoiseSequence(job, display, interrupt.token());
+    ProgressDisplay display(frames.size());
+    reports = denoiseSequence(std::move(job), display, interrupt.token());
   }
-  if (!command.stats.empty()) writeStats(command.stats, job, reports);
+  if (!command.stats.empty()) writeStats(command.stats, frames, reports);
   for (const FrameReport& report : reports)
     if (report.status == FrameReport::Status::Failed) throw Incomplete();
   if (missing) throw Incomplete();

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <exception>
 
+#include "deep/alpha.h"
 #include "deep/channels.h"
 #include "flat/error.h"
 
@@ -11,39 +14,85 @@ namespace fathom::cli {
 
 namespace {
 
-SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, const deep::DenoiseParams& params) {
-  SequencePlan plan;
-  plan.denoise.params = params;
-  FrameSource source(inputs, options);
-  plan.deep = source.deep();
+// Whether every sample is one camera sample: all have the same part of their pixel, of which most have several. So says
+// the channel convention of files of samples; bins of a render differ in how many samples they hold.
+bool holdsCameraSamples(const deep::DeepImage& image) {
+  const std::optional<int> spp = image.attributes.getInt("fathom:spp");
+  const Buffer<float> share = deep::effectiveAlpha(image);
+  if (share.empty() || image.find("ZBack")) return false;
+  const float part = spp && *spp > 0 ? 1.0f / float(*spp) : share[0];
+  size_t alike = 0, filled = 0;
+  for (const float s : share) alike += std::abs(s - part) <= 1e-3f * part;
+  for (size_t pixel = 0; pixel < image.pixels(); ++pixel) filled += image.count(pixel) > 0;
+  return part <= 0.5f && double(alike) >= 0.99 * double(share.size()) && share.size() >= filled * 3 / 2;
+}
+
+bool hasStatistics(const deep::PartInfo& part) {
+  return std::any_of(part.channels.begin(), part.channels.end(), [](const deep::ChannelInfo& channel) {
+    return deep::describesSamples(deep::roleOf(channel.name, channel.type));
+  });
+}
+
+void findInputs(SequencePlan& plan, FrameSource& source) {
   const Box window = source.part().dataWindow;
   const deep::DeepImage row = source.read(window.y0, std::min(window.y0 + 1, window.y1), plan.notes);
   std::vector<std::string> names;
   for (const deep::Channel& channel : row.channels) names.push_back(channel.name);
+  for (const char* needed : {"R", "G", "B", "A", "Z"})
+    if (std::find(names.begin(), names.end(), needed) == names.end())
+      fail("{}, channel {}: expected in a file to denoise, found none", source.path(), needed);
   plan.denoise.inputs = deep::findDenoiseInputs(names, row.attributes);
   for (const std::string& line : deep::describeMissing(plan.denoise.inputs))
-    plan.notes.insert(fmt::format("{}: {}", inputs.main, line));
+    plan.notes.insert(fmt::format("{}: {}", source.path(), line));
+}
+
+// Only what is wanted by the denoiser and for the output is read.
+void wantInputs(const deep::DenoisePlan& plan, FrameSource& source) {
+  source.want([plan](const std::string& name) {
+    const bool statistic = deep::describesSamples(deep::roleOf(name, deep::PixelType::Float));
+    return !statistic || plan.params.keepStatistics || deep::denoiseReads(plan.inputs, name);
+  });
+}
+
+SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, const deep::DenoiseParams& params,
+                      bool wanted) {
+  SequencePlan plan;
+  plan.denoise.params = params;
+  plan.first = inputs.main;
+  FrameSource source(inputs, options);
+  plan.deep = source.deep();
+  findInputs(plan, source);
+  wantInputs(plan.denoise, source);
+  const Box window = source.part().dataWindow;
+  const bool statistics = hasStatistics(source.part());
+  if (wanted && statistics && source.decodedBytes(window.y0, window.y1) <= options.memory / kFramesInMemory) {
+    plan.firstImage = source.read(plan.notes);
+    plan.denoise.level = deep::meanLevel(*plan.firstImage);
+    return plan;
+  }
   source.want([](const std::string& name) {
     return name == "R" || name == "G" || name == "B" || name == "A" || name == "Z" || name == "ZBack";
   });
-  std::set<std::string> repeated;
-  plan.denoise.level = deep::meanLevel(source.read(repeated));
+  const deep::DeepImage colours = source.read(plan.notes);
+  plan.denoise.level = deep::meanLevel(colours);
+  plan.cameraSamples = plan.deep && !statistics && holdsCameraSamples(colours);
+  if (plan.cameraSamples) {
+    plan.notes = {fmt::format("{}: one deep sample per camera sample: clustered into bins first", inputs.main)};
+    source.want({});
+    source.clusterFirst();
+    findInputs(plan, source);
+  }
   return plan;
 }
 
 }  // namespace
 
-bool isWanted(const deep::DenoisePlan& plan, const std::string& channel) {
-  const bool statistic = deep::describesSamples(deep::roleOf(channel, deep::PixelType::Float));
-  return !statistic || plan.params.keepStatistics || deep::denoiseReads(plan.inputs, channel);
-}
-
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
-                          const deep::DenoiseParams& params) {
+                          const deep::DenoiseParams& params, const std::string& wanted) {
   std::exception_ptr first;
   for (const FrameInputs& inputs : candidates) {
     try {
-      return planFrom(inputs, options, params);
+      return planFrom(inputs, options, params, inputs.main == wanted);
     } catch (const Error&) {
       if (!first) first = std::current_exception();
     }
@@ -52,10 +101,23 @@ SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const Sour
   fail("expected a frame to plan from, found none");
 }
 
-std::string describePlan(const deep::DenoisePlan& plan) {
-  const deep::DenoiseInputs& in = plan.inputs;
-  std::string text = fmt::format("quality {} gate {} keep {} level {:a} spp {} inputs", int(plan.params.quality),
-                                 plan.params.gate, plan.params.keepStatistics, plan.level, in.spp);
+FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, const SequencePlan& plan) {
+  FrameSource source(inputs, options);
+  if (source.deep() != plan.deep)
+    fail("{}: expected a {} file like the first of the sequence", inputs.main, plan.deep ? "deep" : "flat");
+  if (plan.cameraSamples) {
+    source.clusterFirst();
+    return source;
+  }
+  wantInputs(plan.denoise, source);
+  return source;
+}
+
+std::string describePlan(const SequencePlan& plan) {
+  const deep::DenoiseInputs& in = plan.denoise.inputs;
+  const deep::DenoiseParams& params = plan.denoise.params;
+  std::string text = fmt::format("quality {} gate {} keep {} level {:a} cluster {} spp {} inputs", int(params.quality),
+                                 params.gate, params.keepStatistics, plan.denoise.level, plan.cameraSamples, in.spp);
   for (const bool flag : {in.components, in.halves, in.albedoHalves, in.variance, in.counts, in.albedo,
                           in.albedoVariance, in.normal, in.normalVariance, in.depthVariance, in.volumes})
     text += flag ? " 1" : " 0";

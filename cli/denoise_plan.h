@@ -12,20 +12,29 @@
 
 namespace fathom::cli {
 
+// How often an image that is denoised is in memory: as it is read and in the denoiser's scratch (4), the next, and the
+// last.
+constexpr size_t kFramesInMemory = 6;
+
 struct SequencePlan {
   deep::DenoisePlan denoise;
   bool deep = true;             // the kind of all frames
+  bool cameraSamples = false;   // they hold one deep sample per camera sample, which are clustered first
   std::set<std::string> notes;  // lines for the user
+  // The main file that this was decided from; and where it is wanted and fits the memory, the image as it is denoised.
+  std::string first;
+  std::optional<deep::DeepImage> firstImage;
 };
 
-// Which channels of the main file are read: what the denoiser uses, and what is carried to the output.
-bool isWanted(const deep::DenoisePlan& plan, const std::string& channel);
-
 // Decided from the first of the candidates that can be read whole; throws what the first one threw where none can.
+// `wanted` is the main file of a frame that will be denoised next.
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
-                          const deep::DenoiseParams& params);
+                          const deep::DenoiseParams& params, const std::string& wanted);
+
+// Opens a frame as the plan has it: what is read, and whether it is clustered.
+FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, const SequencePlan& plan);
 
 // All of the plan that decides what comes out, as text to be hashed.
-std::string describePlan(const deep::DenoisePlan& plan);
+std::string describePlan(const SequencePlan& plan);
 
 }  // namespace fathom::cli

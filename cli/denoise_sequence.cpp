@@ -19,9 +19,6 @@ namespace fathom::cli {
 
 namespace {
 
-// The decoded chunk and the denoiser's scratch are 4 times the chunk; the next one is read and the last one written.
-constexpr size_t kChunksInMemory = 6;
-
 class Stopwatch {
  public:
   double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
@@ -79,7 +76,7 @@ std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
     int y1 = y0 + 1;
     if (bytes(y0, y1) > budget)
       fail("{}: expected at least {} MB of memory for rows {} to {}, found a limit of {} MB", source.path(),
-           bytes(y0, y1) * kChunksInMemory / 1'000'000 + 1, y0 - halo, y1 + halo, budget * kChunksInMemory / 1'000'000);
+           bytes(y0, y1) * kFramesInMemory / 1'000'000 + 1, y0 - halo, y1 + halo, budget * kFramesInMemory / 1'000'000);
     while (y1 < window.y1 && bytes(y0, y1 + 1) <= budget) ++y1;
     bands.push_back({y0, y1});
     y0 = y1;
@@ -90,7 +87,7 @@ std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
 // The first stage: checks what is there already, and reads.
 class ChunkReader {
  public:
-  explicit ChunkReader(const DenoiseJob& job) : job_(job), halo_(deep::denoiseHalo(job.plan.denoise)) {}
+  explicit ChunkReader(DenoiseJob& job) : job_(job), halo_(deep::denoiseHalo(job.plan.denoise)) {}
 
   // The next chunk, or nothing after the last one.
   std::optional<Chunk> next() {
@@ -105,8 +102,11 @@ class ChunkReader {
         const Box& window = source_->part().dataWindow;
         chunk.origin = origin_;
         chunk.band = bands_[band_++];
-        chunk.image = source_->read(std::max(chunk.band.y0 - halo_, window.y0),
-                                    std::min(chunk.band.y1 + halo_, window.y1), chunk.notes);
+        if (bands_.size() == 1 && job_.plan.firstImage && job_.plan.first == source_->path())
+          chunk.image = *std::exchange(job_.plan.firstImage, std::nullopt);
+        else
+          chunk.image = source_->read(std::max(chunk.band.y0 - halo_, window.y0),
+                                      std::min(chunk.band.y1 + halo_, window.y1), chunk.notes);
         chunk.last = band_ == bands_.size();
       }
     } catch (const std::exception&) {
@@ -123,17 +123,14 @@ class ChunkReader {
   bool open() {
     const DenoiseFrame& frame = job_.frames[frame_];
     ContentHash hash;
-    for (const std::string& text : {std::string(FATHOM_VERSION), job_.settings, describePlan(job_.plan.denoise)})
+    for (const std::string& text : {std::string(FATHOM_VERSION), job_.settings, describePlan(job_.plan)})
       hash.add(text);
     for (const std::string& file : frame.inputs.files()) hash.addFile(file);
     const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
     if (isDone(frame.outputs, madeBy)) return false;
 
-    source_.emplace(frame.inputs, job_.source);
-    if (source_->deep() != job_.plan.deep)
-      fail("{}: expected a {} file like the sequence's first", frame.inputs.main, job_.plan.deep ? "deep" : "flat");
-    source_->want([this](const std::string& name) { return isWanted(job_.plan.denoise, name); });
-    bands_ = cutBands(*source_, halo_, job_.memory / kChunksInMemory);
+    source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
+    bands_ = cutBands(*source_, halo_, job_.memory / kFramesInMemory);
     origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
                                                         source_->part().dataWindow, source_->flatAttributes(), madeBy});
     return true;
@@ -160,7 +157,7 @@ class ChunkReader {
     ++frame_;
   }
 
-  const DenoiseJob& job_;
+  DenoiseJob& job_;
   const int halo_;
   size_t frame_ = 0, band_ = 0;
   std::optional<FrameSource> source_;
@@ -199,8 +196,14 @@ class ChunkWriter {
 // The stages together, and what is told of them.
 class SequenceRun {
  public:
-  SequenceRun(const DenoiseJob& job, ProgressDisplay& display, const std::stop_token& stop)
-      : job_(job), display_(display), stop_(stop), reader_(job), writer_(job), reports_(job.frames.size()) {}
+  SequenceRun(DenoiseJob job, ProgressDisplay& display, const std::stop_token& stop)
+      : job_(std::move(job)),
+        display_(display),
+        stop_(stop),
+        reader_(job_),
+        writer_(job_),
+        reports_(job_.frames.size()),
+        told_(job_.plan.notes) {}
 
   std::vector<FrameReport> run() {
     const std::launch launch = job_.overlap ? std::launch::async : std::launch::deferred;
@@ -224,7 +227,7 @@ class SequenceRun {
   bool process(Chunk& chunk) {
     FrameReport& report = reports_[chunk.frame];
     for (const std::string& note : chunk.notes)
-      if (notes_.insert(note).second) display_.tell(note);
+      if (told_.insert(note).second) display_.tell(note);
     if (!report.error.empty()) return false;  // an earlier band failed
     report.stats.seconds["read"] += chunk.seconds;
     ++report.bands;
@@ -283,20 +286,20 @@ class SequenceRun {
     display_.frameDone("");
   }
 
-  const DenoiseJob& job_;
+  DenoiseJob job_;
   ProgressDisplay& display_;
   const std::stop_token stop_;
   ChunkReader reader_;
   ChunkWriter writer_;
   std::vector<FrameReport> reports_;
-  std::set<std::string> notes_;
+  std::set<std::string> told_;
   std::future<Chunk> writing_;  // last: its destructor waits for the writer
 };
 
 }  // namespace
 
-std::vector<FrameReport> denoiseSequence(const DenoiseJob& job, ProgressDisplay& display, const std::stop_token& stop) {
-  return SequenceRun(job, display, stop).run();
+std::vector<FrameReport> denoiseSequence(DenoiseJob job, ProgressDisplay& display, const std::stop_token& stop) {
+  return SequenceRun(std::move(job), display, stop).run();
 }
 
 }  // namespace fathom::cli

@@ -37,6 +37,6 @@ struct FrameReport {
 };
 
 // One report per frame. A frame that fails leaves no output and does not stop the others. Throws Cancelled.
-std::vector<FrameReport> denoiseSequence(const DenoiseJob& job, ProgressDisplay& display, const std::stop_token& stop);
+std::vector<FrameReport> denoiseSequence(DenoiseJob job, ProgressDisplay& display, const std::stop_token& stop);
 
 }  // namespace fathom::cli

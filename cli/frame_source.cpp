@@ -7,7 +7,9 @@
 #include <charconv>
 
 #include "deep/assemble.h"
+#include "deep/cluster.h"
 #include "deep/one_bin.h"
+#include "deep/ppu_scale.h"
 #include "deep/tidy.h"
 #include "flat/error.h"
 #include "flat/io.h"
@@ -187,6 +189,14 @@ void FrameSource::want(std::function<bool(const std::string&)> wanted) {
   main_->want(std::move(wanted));
 }
 
+void FrameSource::clusterFirst() {
+  try {
+    ppuScale_ = deep::findPpuScale(part().attributes, part().displayWindow);
+  } catch (const Error& e) {
+    fail("{}: camera samples, which `fathom cluster` makes bins of: {}", path(), e.what());
+  }
+}
+
 size_t FrameSource::decodedBytes(int y0, int y1) {
   size_t bytes = 0;
   for (MappedFile* file : {main_.get(), features_.get(), halves_[0].get(), halves_[1].get(), alpha_.get()})
@@ -196,6 +206,7 @@ size_t FrameSource::decodedBytes(int y0, int y1) {
 
 deep::DeepImage FrameSource::read(int y0, int y1, std::set<std::string>& notes) {
   deep::DeepImage image = main_->read(y0, y1, notes);
+  if (ppuScale_) image = deep::cluster(image, deep::findBins(image, *ppuScale_));
   for (int i = 0; i < 2; ++i) {
     if (!halves_[size_t(i)]) continue;
     const deep::DeepImage half = halves_[size_t(i)]->read(y0, y1, notes);

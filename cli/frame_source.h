@@ -50,6 +50,9 @@ class FrameSource {
 
   // From now on, only channels of the main file with these names are read.
   void want(std::function<bool(const std::string&)> wanted);
+  // The main file holds one sample per camera sample: they become bins, as `fathom cluster` makes them.
+  void clusterFirst();
+
   // Bytes that rows [y0, y1) take when they are decoded, all files together.
   size_t decodedBytes(int y0, int y1);
   // Rows [y0, y1): sorted bins under our names. `notes` receives what the user ought to know, a line each.
@@ -58,6 +61,7 @@ class FrameSource {
 
  private:
   std::unique_ptr<MappedFile> main_, features_, alpha_;
+  std::optional<float> ppuScale_;  // of a main file that is clustered first
   std::array<std::unique_ptr<MappedFile>, 2> halves_;
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "deep/alpha.h"
+#include "deep/bin_layout.h"
 #include "deep/channels.h"
 #include "deep/volume.h"
 #include "flat/parallel.h"
@@ -18,20 +19,19 @@ namespace {
 
 constexpr uint32_t kNowhere = std::numeric_limits<uint32_t>::max();
 
-Buffer<float> middles(const DeepImage& image) {
+Buffer<float> depths(const DeepImage& image) {
   const std::span<const float> z = image.get("Z"), back = image.tryGet("ZBack");
   Buffer<float> result(z.size());
-  for (size_t i = 0; i < z.size(); ++i)
-    result[i] = !back.empty() && back[i] > z[i] ? float((double(z[i]) + double(back[i])) / 2) : z[i];
+  for (size_t i = 0; i < z.size(); ++i) result[i] = binDepth(z[i], back.empty() ? z[i] : back[i]);
   return result;
 }
 
-// The index of the depth that is nearest to `z`; of equal ones the first. `depths` ascends and is not empty.
-size_t nearest(std::span<const float> depths, float z) {
-  const size_t above = size_t(std::lower_bound(depths.begin(), depths.end(), z) - depths.begin());
+// The index of the depth that is nearest to `z`; of equal ones the first. `bins` ascends and is not empty.
+size_t nearest(std::span<const float> bins, float z) {
+  const size_t above = size_t(std::lower_bound(bins.begin(), bins.end(), z) - bins.begin());
   if (above == 0) return 0;
-  if (above == depths.size()) return above - 1;
-  return double(z) - double(depths[above - 1]) <= double(depths[above]) - double(z) ? above - 1 : above;
+  if (above == bins.size()) return above - 1;
+  return double(z) - double(bins[above - 1]) <= double(bins[above]) - double(z) ? above - 1 : above;
 }
 
 // Which samples of one image come to which bins of another, and with what weight.
@@ -39,7 +39,7 @@ class Pairing {
  public:
   Pairing(const DeepImage& to, const DeepImage& from)
       : to_(to), from_(from), weight_(effectiveAlpha(from)), bin_(from.samples()), nearestSample_(to.samples()) {
-    const Buffer<float> toDepth = middles(to), fromDepth = middles(from);
+    const Buffer<float> toDepth = depths(to), fromDepth = depths(from);
     nearestSample_.fill(kNowhere);
     forEachPixel([&](size_t toFirst, size_t toCount, size_t fromFirst, size_t fromCount) {
       const std::span<const float> bins{toDepth.data() + toFirst, toCount};
