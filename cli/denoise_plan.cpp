@@ -118,7 +118,7 @@ std::string describePlan(const SequencePlan& plan) {
   const deep::DenoiseParams& params = plan.denoise.params;
   std::string text = fmt::format("quality {} gate {} keep {} level {:a} cluster {} spp {} inputs", int(params.quality),
                                  params.gate, params.keepStatistics, plan.denoise.level, plan.cameraSamples, in.spp);
-  for (const bool flag : {in.components, in.halves, in.albedoHalves, in.variance, in.counts, in.albedo,
+  for (const bool flag : {in.components, in.halves, in.halfCounts, in.albedoHalves, in.variance, in.counts, in.albedo,
                           in.albedoVariance, in.normal, in.normalVariance, in.depthVariance, in.volumes})
     text += flag ? " 1" : " 0";
   return text;
