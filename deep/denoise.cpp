@@ -58,13 +58,6 @@ int guideBorder(const JointFilterParams& params) {
   return params.radius + params.patchRadius;
 }
 
-FeatureGroup featureGroup(const Feature& feature, const std::vector<Buffer<float>>& gradient) {
-  FeatureGroup group;
-  for (size_t c = 0; c < feature.value.size(); ++c)
-    group.channels.push_back({feature.value[c].data(), feature.variance[c].data(), gradient[c].data()});
-  return group;
-}
-
 // Sections 4.1 and 4.2: the bank's candidates for every component, blended. Per component and bin 3 values.
 std::vector<Buffer<float>> filterComponents(const DenoiseData& data, std::span<const ComponentGuide> guides,
                                             const Activity& activity, const DenoisePlan& plan, const Progress& progress,
@@ -80,7 +73,8 @@ std::vector<Buffer<float>> filterComponents(const DenoiseData& data, std::span<c
   for (size_t f = 0; f < 3; ++f) {
     if (features[f]->value.empty()) continue;
     gradients[f] = squaredGradients(data, *features[f]);
-    input.features.push_back(featureGroup(*features[f], gradients[f]));
+    for (size_t c = 0; c < gradients[f].size(); ++c)
+      input.features.push_back({features[f]->value[c].data(), features[f]->variance[c].data(), gradients[f][c].data()});
   }
   std::vector<Candidates> candidates;
   for (size_t c = 0; c < data.components.size(); ++c) {

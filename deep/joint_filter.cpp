@@ -23,7 +23,12 @@ struct FilterScratch {
   static constexpr int kStride = kTileWidth + 32;
   Buffer<float> distance[2], across[2];  // per block: per-pixel distances, and their sums along rows
   Buffer<float> colourWeights;           // [component][dx][row][column][candidate][block]
-  std::array<Buffer<float>, kMaxCandidates> featureWeights;  // over the bins of one row of the window
+  Buffer<float> centres;                 // [bin][feature channel]: value, variance, 1 / (channels * denominator)
+  // Candidates with the same k_F share weights: slot[k] is the one of candidate k.
+  std::array<float, kMaxCandidates> exponent{};
+  std::array<size_t, kMaxCandidates> slot{};
+  size_t exponents = 0;
+  std::array<Buffer<float>, kMaxCandidates> featureWeights;  // [slot], over the bins of one row of the window
   Buffer<float> sums, own;
 };
 
@@ -119,50 +124,53 @@ void ColourWeights(const JointFilterParams& params, int height, const FilterScra
   }
 }
 
-// Equations 4 and 5 with the deep d_f of section 4.1: the weights of `count` bins from `first` on, seen from `bin` of
-// `pixel`.
-void FeatureWeights(const JointFilterInput& in, const JointFilterParams& params, size_t pixel, size_t bin, size_t first,
-                    size_t count, FilterScratch& s) {
+// What the feature distances of one centre bin need, by channel: computed once, used for every row of the window.
+void FeatureCentres(const JointFilterInput& in, const JointFilterParams& params, const Box& tile, FilterScratch& s) {
+  const size_t channels = in.features.size();
+  float* out = s.centres.data();
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      const size_t pixel = size_t(y) * size_t(in.width) + size_t(x);
+      for (size_t bin = size_t(in.offsets[pixel]); bin < size_t(in.offsets[pixel + 1]); ++bin) {
+        for (size_t j = 0; j < channels; ++j, out += 3) {
+          const FeatureChannel& c = in.features[j];
+          const float v = c.variance[bin];
+          const float size = j + 1 < channels ? 3 : 1;
+          out[0] = c.value[bin];
+          out[1] = v;
+          out[2] = 1.0f / (size * std::max(params.tau, std::max(v, c.gradient2[pixel])));
+        }
+      }
+    }
+  }
+}
+
+// Equations 4 and 5 with the deep d_f of section 4.1: the weights of `count` bins from `first` on, seen from one
+// centre.
+template <int kTriples>
+void FeatureWeights(const JointFilterInput& in, const float* HWY_RESTRICT centre, size_t first, size_t count,
+                    FilterScratch& s) {
   const hn::ScalableTag<float> d;
   const size_t N = hn::Lanes(d);
-  struct Centre {
-    const float *value, *variance;
-    float valueHere, varianceHere, scale;
-  };
-  Centre centre[9];
-  size_t channels = 0;
-  size_t groupEnd[3];
-  size_t groups = 0;
-  for (const FeatureGroup& group : in.features) {
-    for (const FeatureGroup::Channel& c : group.channels) {
-      const float v = c.variance[bin];
-      const float least = std::max(params.tau, std::max(v, c.gradient2[pixel]));
-      centre[channels++] = {c.value + first, c.variance + first, c.value[bin], v,
-                            1.0f / (float(group.channels.size()) * least)};
-    }
-    groupEnd[groups++] = channels;
+  constexpr int kChannels = 3 * kTriples + 1;
+  const float *value[kChannels], *variance[kChannels];
+  for (int j = 0; j < kChannels; ++j) {
+    value[j] = in.features[size_t(j)].value + first;
+    variance[j] = in.features[size_t(j)].variance + first;
   }
   for (size_t i = 0; i < count; i += N) {
-    auto worst = hn::Zero(d);
-    size_t j = 0;
-    for (size_t g = 0; g < groups; ++g) {
-      auto sum = hn::Zero(d);
-      for (; j < groupEnd[g]; ++j) {
-        const Centre& c = centre[j];
-        const auto e = hn::Sub(hn::LoadU(d, c.value + i), hn::Set(d, c.valueHere));
-        const auto here = hn::Set(d, c.varianceHere);
-        const auto least = hn::Add(here, hn::Min(here, hn::LoadU(d, c.variance + i)));
-        sum = hn::MulAdd(hn::Sub(hn::Mul(e, e), least), hn::Set(d, c.scale), sum);
-      }
-      worst = hn::Max(worst, sum);
-    }
-    for (int k = 0; k < params.candidates; ++k) {
-      const float kf = params.kFeature[size_t(k)];
-      float* out = s.featureWeights[size_t(k)].data();
-      if (k > 0 && kf == params.kFeature[size_t(k) - 1])
-        hn::StoreU(hn::LoadU(d, s.featureWeights[size_t(k) - 1].data() + i), d, out + i);
-      else
-        hn::StoreU(flat::HWY_NAMESPACE::ExpNegative(d, hn::Mul(worst, hn::Set(d, -1.0f / (kf * kf)))), d, out + i);
+    const auto distance = [&](int j) HWY_ATTR {
+      const auto e = hn::Sub(hn::LoadU(d, value[j] + i), hn::Set(d, centre[3 * j]));
+      const auto here = hn::Set(d, centre[3 * j + 1]);
+      const auto least = hn::Add(here, hn::Min(here, hn::LoadU(d, variance[j] + i)));
+      return hn::Mul(hn::Sub(hn::Mul(e, e), least), hn::Set(d, centre[3 * j + 2]));
+    };
+    auto worst = hn::Max(distance(kChannels - 1), hn::Zero(d));
+    for (int g = 0; g < kTriples; ++g)
+      worst = hn::Max(worst, hn::Add(hn::Add(distance(3 * g), distance(3 * g + 1)), distance(3 * g + 2)));
+    for (size_t k = 0; k < s.exponents; ++k) {
+      const auto exponent = hn::Mul(worst, hn::Set(d, s.exponent[k]));
+      hn::StoreU(flat::HWY_NAMESPACE::ExpNegative(d, exponent), d, s.featureWeights[k].data() + i);
     }
   }
 }
@@ -182,6 +190,8 @@ class RowSum {
                   size_t first, const std::array<const float*, 2>& weights, size_t step, const FilterScratch& s,
                   float* HWY_RESTRICT sums) {
     const D d;
+    std::array<const float*, kCandidates> featureWeights;
+    for (size_t k = 0; k < kCandidates; ++k) featureWeights[k] = s.featureWeights[s.slot[k]].data();
     V acc[kComponents][kCandidates][kParts];
     for (int c = 0; c < kComponents; ++c)
       for (int k = 0; k < kCandidates; ++k)
@@ -196,7 +206,7 @@ class RowSum {
           V value[kComponents];
           for (int c = 0; c < kComponents; ++c) value[c] = hn::LoadU(d, data[size_t(c)] + bin * 8 + p * kLanes);
           for (int k = 0; k < kCandidates; ++k) {
-            const V feature = hn::Set(d, s.featureWeights[size_t(k)][bin - first]);
+            const V feature = hn::Set(d, featureWeights[size_t(k)][bin - first]);
             for (int c = 0; c < kComponents; ++c) {
               const V w = k < kColour ? hn::Min(colour[c][k < kColour ? k : 0][p], feature) : feature;
               acc[c][k][p] = hn::MulAdd(w, value[c], acc[c][k][p]);
@@ -232,6 +242,9 @@ void SumRow(const JointFilterInput& in, const JointFilterParams& params, const s
   const std::array<const float*, 2> data{in.components[size_t(which[0])].data, in.components[size_t(which[1])].data};
   const size_t plane = size_t(kTileWidth) * kTileHeight * 4;
   const size_t perComponent = plane * size_t(2 * R + 1);
+  const auto featureWeights = in.features.size() == 1   ? &FeatureWeights<0>
+                              : in.features.size() == 4 ? &FeatureWeights<1>
+                                                        : &FeatureWeights<2>;
   size_t local = 0;
   for (int y = tile.y0; y < tile.y1; ++y) {
     const int yq = y + dy;
@@ -254,7 +267,7 @@ void SumRow(const JointFilterInput& in, const JointFilterParams& params, const s
                                                 s.colourWeights.data() + at + perComponent};
       for (size_t b = begin; b < end; ++b) {
         float* sums = s.sums.data() + (here + b - begin) * kSums;
-        FeatureWeights(in, params, pixel, b, first, count, s);
+        featureWeights(in, s.centres.data() + (here + b - begin) * 3 * in.features.size(), first, count, s);
         if (dy != 0) {
           RowSum<kComponents, kCandidates, kColour>::Add(data, offsets, pixels, first, weights, plane, s, sums);
           continue;
@@ -298,6 +311,7 @@ void FilterOneTile(const JointFilterInput& in, const JointFilterParams& params, 
   const size_t plane = size_t(kTileWidth) * kTileHeight * 4;
   const auto sumRow = components == 1 ? ChooseSumRow<1>(params.candidates, params.colourCandidates)
                                       : ChooseSumRow<2>(params.candidates, params.colourCandidates);
+  FeatureCentres(in, params, tile, s);
   for (int dy = -params.radius; dy <= params.radius; ++dy) {
     if (tile.y1 + dy <= 0 || tile.y0 + dy >= in.height) continue;
     if (params.colourCandidates > 0) {
@@ -338,7 +352,20 @@ size_t binsOf(const JointFilterInput& in, const Box& tile) {
   return bins;
 }
 
-void prepareScratch(const JointFilterParams& params, size_t components, size_t sums, FilterScratch& s) {
+void shareExponents(const JointFilterParams& params, FilterScratch& s) {
+  s.exponents = 0;
+  for (size_t k = 0; k < size_t(params.candidates); ++k) {
+    const float exponent = -1 / (params.kFeature[k] * params.kFeature[k]);
+    size_t slot = 0;
+    while (slot < s.exponents && s.exponent[slot] != exponent) ++slot;
+    if (slot == s.exponents) s.exponent[s.exponents++] = exponent;
+    s.slot[k] = slot;
+  }
+}
+
+void prepareScratch(const JointFilterParams& params, size_t components, size_t sums, size_t centres, FilterScratch& s) {
+  shareExponents(params, s);
+  if (s.centres.size() < centres) s.centres = Buffer<float>(centres);
   const size_t rows = size_t(kTileHeight + 2 * params.patchRadius);
   if (s.distance[0].empty()) {
     for (int block = 0; block < 2; ++block) {
@@ -373,8 +400,9 @@ void jointFilter(const JointFilterInput& input, const JointFilterParams& params,
     int components = 0;
     for (unsigned m = mask; m; m &= m - 1) ++components;
     if (mask) {
-      prepareScratch(params, input.components.size(), binsOf(input, tile) * size_t(components * params.candidates * 8),
-                     s);
+      const size_t bins = binsOf(input, tile);
+      prepareScratch(params, input.components.size(), bins * size_t(components * params.candidates * 8),
+                     bins * input.features.size() * 3, s);
       HWY_DYNAMIC_DISPATCH(FilterOneTile)(input, params, tile, mask, s);
     }
     consume({tile, s.sums.data(), s.own.data(), components, params.candidates, mask});

@@ -37,15 +37,12 @@ struct JointFilterParams {
   bool crossed = true;
 };
 
-// A feature of one to three channels: values and variances of the mean by bin, squared gradient of the flattened
-// feature by pixel.
-struct FeatureGroup {
-  struct Channel {
-    const float* value;
-    const float* variance;
-    const float* gradient2;
-  };
-  std::vector<Channel> channels;
+// One channel of a feature: values and variances of the mean by bin, squared gradient of the flattened feature by
+// pixel.
+struct FeatureChannel {
+  const float* value;
+  const float* variance;
+  const float* gradient2;
 };
 
 // The flattened data of one block, padded by radius + patchRadius, and its variance.
@@ -66,7 +63,8 @@ struct JointFilterInput {
   int width = 0, height = 0;
   int rowPhase = 0;                   // absolute row of the first one: fixes the tiles, whatever band of rows this is
   const uint64_t* offsets = nullptr;  // width * height + 1
-  std::vector<FeatureGroup> features;
+  std::vector<FeatureChannel>
+      features;  // any number of features of three channels up to two, then one of a single channel
   std::vector<FilterComponent> components;  // 1 or 2
 };
 
