@@ -240,7 +240,7 @@ void addDenoise(CLI::App& app) {
       ->default_str(command->missing);
   option("--part", command->part, "PART", "Part of IN, by number or name (default: the first deep one)");
   option("--map", command->map, "FILE",
-         fmt::format("Channel names of another renderer: lines such as albedo = diffuse_albedo, or one of {}",
+         fmt::format("Channel names of another renderer: lines such as albedo = diffuse_albedo, or one of: {}",
                      fmt::join(presetNames(), ", ")));
   option("--features", command->features, "FILE", "Deep or flat file with the albedo.* and N.* that IN lacks");
   option("--half", command->halves, "A B",

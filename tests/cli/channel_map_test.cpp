@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <fstream>
+#include <map>
 
 #include "flat/error.h"
 #include "tests/reference/temporary_folder.h"
@@ -118,6 +120,33 @@ TEST(ChannelMap, ErrorsNameTheLine) {
                            "albedo = a unpremultiplied b", "= a"})
     EXPECT_THAT(errorOf([&] { parseChannelMap("m", std::string("\n") + text); }), HasSubstr("channel map m, line 2: "))
         << text;
+}
+
+TEST(ChannelMap, PresetsLoseNoLight) {
+  const std::map<std::string, std::vector<std::string>> documented = {
+      {"arnold", {"diffuse.R", "diffuse_albedo.R"}},
+      {"karma", {"combineddiffuse.r"}},
+      {"renderman", {"diffuse.r", "specular.r", "albedo.r", "normal.x", "mse.r", "diffuse_mse.r"}},
+      {"vray", {"diffuse.red", "lighting.red", "gi.red"}}};
+  const std::map<std::string, std::array<std::string, 3>> ends = {
+      {"R", {"R", "G", "B"}}, {"r", {"r", "g", "b"}}, {"x", {"x", "y", "z"}}, {"red", {"red", "green", "blue"}}};
+  for (const std::string& preset : presetNames()) {
+    deep::DeepImage image = makeSample({{"R", 9.0f}, {"G", 9.0f}, {"B", 9.0f}, {"A", 1.0f}});
+    for (const std::string& first : documented.at(preset)) {
+      const size_t dot = first.find('.');
+      // In RenderMan's file the two are the whole; elsewhere specular is what diffuse leaves.
+      const float value = first == "diffuse.r" ? 4.0f : first == "specular.r" ? 5.0f : 2.0f;
+      for (const std::string& end : ends.at(first.substr(dot + 1)))
+        image.add(first.substr(0, dot + 1) + end, deep::PixelType::Float).values.fill(value);
+    }
+    std::vector<std::string> names = namesOf(image);
+    applyMap(resolveMap(readChannelMap(preset), names), image);
+    for (const char* channel : {"R", "G", "B"})
+      EXPECT_EQ(image.get(std::string("diffuse.") + channel)[0] + image.get(std::string("specular.") + channel)[0],
+                9.0f)
+          << preset;
+    EXPECT_EQ(image.find("albedo.B") != nullptr, preset != "karma") << preset;
+  }
 }
 
 TEST(ChannelMap, FilesAndPresets) {

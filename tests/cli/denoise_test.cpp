@@ -1,8 +1,17 @@
+#include <OpenEXR/ImfDeepScanLineInputFile.h>
+#include <OpenEXR/ImfDeepScanLineOutputPart.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfMultiPartOutputFile.h>
+#include <OpenEXR/ImfOutputPart.h>
+#include <OpenEXR/ImfPartType.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -13,7 +22,7 @@
 #include "deep/io.h"
 #include "flat/io.h"
 #include "tests/reference/noisy_frame.h"
-#include "tests/reference/program.h"
+#include "tests/reference/run_fathom.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom {
@@ -31,17 +40,15 @@ class Denoise : public testing::Test {
     for (int i = 1; i <= count; ++i)
       deep::write(folder_ / fmt::format("in.{:04}.exr", i), makeNoisyFrame(width, height, unsigned(i)));
   }
-  Outcome run(const std::string& arguments, const std::string& before = "") const {
-    return runFathom(folder_.path(), "denoise " + arguments, before);
+  Ran run(const std::string& arguments, const std::string& before = "") const {
+    return runFathom("denoise " + arguments, "cd '" + folder_.path() + "'; " + before);
   }
   bool exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
-  std::string bytes(const std::string& name) const { return contentsOf(folder_ / name); }
+  std::string bytes(const std::string& name) const { return textOf(folder_ / name); }
   std::set<std::string> files() const {
     std::set<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
       names.insert(entry.path().filename().string());
-    names.erase("stdout");
-    names.erase("stderr");
     return names;
   }
 
@@ -64,7 +71,7 @@ std::set<std::string> namesOf(const DeepImage& image) {
 
 TEST_F(Denoise, BinsStayAndColoursChange) {
   writeFrames(1);
-  const Outcome outcome = run("in.0001.exr -o out.exr");
+  const Ran outcome = run("in.0001.exr -o out.exr");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("out.exr"));
   const DeepImage in = deep::read(folder_ / "in.0001.exr"), out = deep::read(folder_ / "out.exr");
@@ -92,14 +99,15 @@ TEST_F(Denoise, BandsAndThreadsDoNotShow) {
   ASSERT_EQ(run("in.exr -o whole.exr --flat whole.flat.exr --threads 1 --stats whole.json").status, 0);
   const std::string whole = bytes("whole.exr");
   for (const char* options : {"--threads 2", "--threads 5", "--threads 2 --memory 7M", "--threads 1 --memory 9M"}) {
-    const Outcome outcome =
+    const Ran outcome =
         run(fmt::format("in.exr -o out.exr --flat out.flat.exr --overwrite --stats out.json {}", options));
     ASSERT_EQ(outcome.status, 0) << options << outcome.err;
     EXPECT_TRUE(bytes("out.exr") == whole) << options;
     // The flat file knows the time it was written at: its pixels are compared.
     const flat::Image expected = flat::read(folder_ / "whole.flat.exr"), found = flat::read(folder_ / "out.flat.exr");
     for (const flat::Plane& plane : expected.planes)
-      EXPECT_TRUE(std::equal(plane.values.begin(), plane.values.end(), found.get(plane.name).values.begin())) << options;
+      EXPECT_TRUE(std::equal(plane.values.begin(), plane.values.end(), found.get(plane.name).values.begin()))
+          << options;
     const auto stats = nlohmann::json::parse(bytes("out.json"));
     if (std::string(options).find("memory") != std::string::npos) {
       EXPECT_GT(stats["frames"][0]["bands"], 1) << options;
@@ -110,7 +118,7 @@ TEST_F(Denoise, BandsAndThreadsDoNotShow) {
 
 TEST_F(Denoise, TooLittleMemoryIsOneLine) {
   writeFrames(1, 200, 10);
-  const Outcome outcome = run("in.0001.exr -o out.exr --memory 64k");
+  const Ran outcome = run("in.0001.exr -o out.exr --memory 64k");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("in.0001.exr"));
   EXPECT_FALSE(exists("out.exr"));
@@ -141,16 +149,15 @@ TEST_F(Denoise, ComponentsThatAreNotThereAreAnError) {
   DeepImage image = makeNoisyFrame(8, 8, 1);
   for (const char* channel : {"R", "G", "B"}) image.erase(std::string("diffuse.") + channel);
   deep::write(folder_ / "in.exr", image);
-  const Outcome outcome = run("in.exr -o out.exr --components");
+  const Ran outcome = run("in.exr -o out.exr --components");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("in.exr: expected diffuse.* and specular.*"));
 }
 
 TEST_F(Denoise, AFlatFileGivesAFlatOne) {
   flat::Image image = deep::flatten(makeNoisyFrame(16, 12, 1));
-  image.get("A").values[0];
   flat::write(folder_ / "in.exr", image);
-  const Outcome outcome = run("in.exr -o out.exr");
+  const Ran outcome = run("in.exr -o out.exr");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const flat::Image out = flat::read(folder_ / "out.exr");
   EXPECT_EQ(out.dataWindow, image.dataWindow);
@@ -170,7 +177,7 @@ TEST_F(Denoise, ASequenceThatIsDoneIsLeftAlone) {
   struct stat info {};
   ASSERT_EQ(stat((folder_ / "out.0002.exr").c_str(), &info), 0);
   std::filesystem::remove(folder_ / "out.0003.exr");
-  const Outcome again = run("in.####.exr -o out.%04d.exr --stats stats.json");
+  const Ran again = run("in.####.exr -o out.%04d.exr --stats stats.json");
   EXPECT_EQ(again.status, 0);
   const auto stats = nlohmann::json::parse(bytes("stats.json"));
   EXPECT_EQ(stats["total"]["frames"]["kept"], 2);
@@ -195,7 +202,7 @@ TEST_F(Denoise, WhatOthersMadeIsRefusedByName) {
   ASSERT_EQ(run("in.####.exr -o out.####.exr").status, 0);
   const std::string before = bytes("out.0001.exr");
   // Other settings.
-  Outcome outcome = run("in.####.exr -o out.####.exr --quality fast");
+  Ran outcome = run("in.####.exr -o out.####.exr --quality fast");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("out.0001.exr: expected nothing there"), HasSubstr("out.0002.exr"),
                                           HasSubstr("--overwrite")));
@@ -228,7 +235,7 @@ TEST_F(Denoise, AKilledRunContinues) {
   kill(child, SIGKILL);
   waitpid(child, nullptr, 0);
   ASSERT_TRUE(exists("out.0001.exr"));
-  const Outcome outcome = run("in.####.exr -o out.####.exr");
+  const Ran outcome = run("in.####.exr -o out.####.exr");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("out.0001.exr: done before"));
   for (int i = 1; i <= 6; ++i)
@@ -260,7 +267,7 @@ TEST_F(Denoise, AStoppedRunLeavesNoHalves) {
 TEST_F(Denoise, AMissingFrameFailsOrIsSkipped) {
   writeFrames(4);
   std::filesystem::remove(folder_ / "in.0002.exr");
-  Outcome outcome = run("in.####.exr -o out.####.exr --frames 1-4");
+  Ran outcome = run("in.####.exr -o out.####.exr --frames 1-4");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("in.####.exr: frame missing: 2"));
   for (const char* done : {"out.0001.exr", "out.0003.exr", "out.0004.exr"}) EXPECT_TRUE(exists(done));
@@ -273,7 +280,7 @@ TEST_F(Denoise, ABrokenFrameDoesNotStopTheOthers) {
   writeFrames(3);
   const std::string whole = bytes("in.0002.exr");
   std::ofstream(folder_ / "in.0002.exr", std::ios::binary) << whole.substr(0, whole.size() / 2);
-  Outcome outcome = run("in.####.exr -o out.####.exr");
+  Ran outcome = run("in.####.exr -o out.####.exr");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("in.0002.exr"));
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
@@ -293,7 +300,7 @@ TEST_F(Denoise, AFrameWithoutAChannelOfTheFirstFailsByName) {
   DeepImage image = makeNoisyFrame(24, 20, 2);
   image.erase("albedo.R");
   deep::write(folder_ / "in.0002.exr", image);
-  const Outcome outcome = run("in.####.exr -o out.####.exr");
+  const Ran outcome = run("in.####.exr -o out.####.exr");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("in.0002.exr"), HasSubstr("albedo.R")));
   EXPECT_TRUE(exists("out.0001.exr"));
@@ -304,7 +311,7 @@ TEST_F(Denoise, NoPlaceToWriteIsOneLine) {
   writeFrames(1);
   std::ofstream(folder_ / "file") << "x";
   for (const char* place : {"file/out.exr", "gone/out.exr"}) {
-    const Outcome outcome = run(fmt::format("in.0001.exr -o {}", place));
+    const Ran outcome = run(fmt::format("in.0001.exr -o {}", place));
     EXPECT_EQ(outcome.status, 1);
     EXPECT_THAT(outcome.err, HasSubstr(place));
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
@@ -313,7 +320,7 @@ TEST_F(Denoise, NoPlaceToWriteIsOneLine) {
 
 TEST_F(Denoise, AFullDiskLeavesNothing) {
   writeFrames(2);
-  const Outcome outcome = run("in.####.exr -o out.####.exr", "trap '' XFSZ; ulimit -f 8;");
+  const Ran outcome = run("in.####.exr -o out.####.exr", "trap '' XFSZ; ulimit -f 8;");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("out.0001.exr"), HasSubstr("out.0002.exr")));
   EXPECT_EQ(files(), (std::set<std::string>{"in.0001.exr", "in.0002.exr"}));
@@ -327,7 +334,7 @@ TEST_F(Denoise, TheInputIsNeverTheOutput) {
        {"in.0001.exr -o in.0001.exr", "in.0001.exr -o ./in.0001.exr --overwrite",
         "in.####.exr -o in.####.exr --overwrite", "in.0001.exr -o link.exr --overwrite",
         "in.0001.exr -o out.exr --flat in.0001.exr --overwrite", "in.0001.exr -o out.exr --flat out.exr"}) {
-    const Outcome outcome = run(arguments);
+    const Ran outcome = run(arguments);
     EXPECT_EQ(outcome.status, 2) << arguments;
     EXPECT_THAT(outcome.err, HasSubstr("expected")) << arguments;
   }
@@ -346,13 +353,68 @@ TEST_F(Denoise, UsageErrorsExitWith2) {
   EXPECT_EQ(run("gone.####.exr -o out.####.exr").status, 1);
 }
 
+// A flat part "note" before the deep part "beauty".
+void writeTwoParts(const std::string& path, const std::string& flatPath, const std::string& deepPath) {
+  Imf::InputFile flatFile(flatPath.c_str());
+  Imf::DeepScanLineInputFile deepFile(deepPath.c_str());
+  std::array<Imf::Header, 2> headers = {flatFile.header(), deepFile.header()};
+  headers[0].setName("note");
+  headers[0].setType(Imf::SCANLINEIMAGE);
+  headers[0].displayWindow() = headers[1].displayWindow();
+  headers[1].setName("beauty");
+  Imf::MultiPartOutputFile file(path.c_str(), headers.data(), 2);
+  Imf::OutputPart(file, 0).copyPixels(flatFile);
+  Imf::DeepScanLineOutputPart(file, 1).copyPixels(deepFile);
+}
+
 TEST_F(Denoise, OtherPartsAreCarriedOver) {
-  writeFrames(1);
-  // A file of two deep parts, made by replacing the one of a two-part file.
-  const DeepImage image = makeNoisyFrame(24, 20, 1);
-  const Outcome outcome = run("in.0001.exr -o out.exr");
-  ASSERT_EQ(outcome.status, 0);
-  EXPECT_EQ(deep::readParts(folder_ / "out.exr").size(), deep::readParts(folder_ / "in.0001.exr").size());
+  deep::write(folder_ / "deep.exr", makeNoisyFrame(24, 20, 1));
+  flat::Image note{{0, 0, 5, 4}, {0, 0, 24, 20}, {}, {}};
+  note.add("note.Y", 0.125f);
+  flat::write(folder_ / "flat.exr", note);
+  writeTwoParts(folder_ / "in.exr", folder_ / "flat.exr", folder_ / "deep.exr");
+  for (const char* options : {"", "--part beauty", "--part 1 --memory 5M"}) {
+    const Ran outcome = run(fmt::format("in.exr -o out.exr {} --overwrite", options));
+    ASSERT_EQ(outcome.status, 0) << options << outcome.err;
+    ASSERT_EQ(deep::readParts(folder_ / "out.exr").size(), 2u);
+    EXPECT_EQ(flat::read(folder_ / "out.exr", {.part = "note"}).get("note.Y").values[3], 0.125f);
+    EXPECT_NE(deep::read(folder_ / "out.exr").get("R")[0], deep::read(folder_ / "in.exr").get("R")[0]);
+  }
+  EXPECT_THAT(run("in.exr -o out.exr --part 7").err, HasSubstr("in.exr: expected a part 7"));
+}
+
+TEST_F(Denoise, CameraSamplesBecomeBinsFirst) {
+  // Eight camera samples in every pixel, four at each of two depths.
+  constexpr int kSpp = 8, kWidth = 12, kHeight = 9;
+  DeepImage image{{0, 0, kWidth, kHeight}, {0, 0, kWidth, kHeight}, {}, {}, {}};
+  image.offsets = Buffer<uint64_t>(image.pixels() + 1);
+  for (size_t i = 0; i <= image.pixels(); ++i) image.offsets[i] = kSpp * i;
+  std::mt19937 random(5);
+  for (const char* name : {"R", "G", "B", "A", "Z"}) {
+    Buffer<float>& values = image.add(name, deep::PixelType::Float).values;
+    for (size_t i = 0; i < values.size(); ++i) {
+      const float k = float(i % kSpp), alpha = 1 / (kSpp - k);
+      values[i] = name[0] == 'A'   ? alpha
+                  : name[0] == 'Z' ? (k < 4 ? 2 : 9) + 0.001f * k
+                                   : alpha * float(random() % 100);
+    }
+  }
+  image.attributes.set("fathom:spp", kSpp);
+  image.attributes.set("fathom:ppuScale", 20.0f);
+  deep::write(folder_ / "in.exr", image);
+  const Ran outcome = run("in.exr -o out.exr --keep");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("clustered into bins first"));
+  const DeepImage out = deep::read(folder_ / "out.exr");
+  EXPECT_EQ(out.samples(), 2 * image.pixels());
+  EXPECT_EQ(out.get("samples")[0], 4.0f);
+  EXPECT_EQ(out.get("A")[1], 1.0f);
+
+  image.attributes.erase("fathom:ppuScale");
+  deep::write(folder_ / "in.exr", image);
+  const Ran without = run("in.exr -o new.exr");
+  EXPECT_EQ(without.status, 1);
+  EXPECT_THAT(without.err, testing::AllOf(HasSubstr("in.exr"), HasSubstr("fathom cluster"), HasSubstr("--ppu-scale")));
 }
 
 TEST_F(Denoise, InPiecesEqualsInOne) {
@@ -369,7 +431,7 @@ TEST_F(Denoise, InPiecesEqualsInOne) {
   only("main.exr", [&](const std::string& name) { return !isFeature(name); });
   only("features.exr", [&](const std::string& name) { return isFeature(name) || name == "A" || name == "Z"; });
   ASSERT_EQ(run("whole.exr -o a.exr").status, 0);
-  const Outcome outcome = run("main.exr -o b.exr --features features.exr");
+  const Ran outcome = run("main.exr -o b.exr --features features.exr");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
   for (const char* channel : {"R", "G", "B", "diffuse.R", "A"}) expectSameValues(a, b, channel);
@@ -392,7 +454,7 @@ TEST_F(Denoise, HalvesFromFilesOfTheirOwn) {
     deep::write(folder_ / (prefix + "exr"), half);
   }
   ASSERT_EQ(run("whole.exr -o a.exr").status, 0);
-  const Outcome outcome = run("main.exr -o b.exr --half half0.exr half1.exr");
+  const Ran outcome = run("main.exr -o b.exr --half half0.exr half1.exr");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
   for (const char* channel : {"R", "diffuse.R", "A"}) expectSameValues(a, b, channel);
@@ -420,7 +482,7 @@ TEST_F(Denoise, NamesOfAnotherRenderer) {
   deep::write(folder_ / "theirs.exr", image);
   std::ofstream(folder_ / "map.txt") << "albedo = surface_albedo\n";
   ASSERT_EQ(run("ours.exr -o a.exr").status, 0);
-  const Outcome outcome = run("theirs.exr -o b.exr --map map.txt");
+  const Ran outcome = run("theirs.exr -o b.exr --map map.txt");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");
   for (const char* channel : {"R", "G", "B"}) expectSameValues(a, b, channel);
@@ -430,7 +492,7 @@ TEST_F(Denoise, NonFiniteSamplesAreToldOnce) {
   DeepImage image = makeNoisyFrame(24, 20, 1);
   for (const char* channel : {"R", "diffuse.R", "half0.R", "half0.diffuse.R"}) image.get(channel)[5] = std::nanf("");
   deep::write(folder_ / "in.exr", image);
-  const Outcome outcome = run("in.exr -o out.exr");
+  const Ran outcome = run("in.exr -o out.exr");
   EXPECT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.err, HasSubstr("in.exr: 1 sample"));
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
@@ -450,7 +512,7 @@ TEST_F(Denoise, UnsortedSamplesAreSorted) {
       }
   deep::write(folder_ / "unsorted.exr", image);
   ASSERT_EQ(run("sorted.exr -o a.exr").status, 0);
-  const Outcome outcome = run("unsorted.exr -o b.exr");
+  const Ran outcome = run("unsorted.exr -o b.exr");
   ASSERT_EQ(outcome.status, 0);
   EXPECT_THAT(outcome.err, HasSubstr("unsorted.exr: samples are sorted"));
   const DeepImage a = deep::read(folder_ / "a.exr"), b = deep::read(folder_ / "b.exr");

@@ -23,11 +23,11 @@ inline std::string textOf(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// `arguments` as typed into a shell.
-inline Ran runFathom(const std::string& arguments) {
+// `arguments` as typed into a shell; `before` is what was typed before, such as "cd folder;".
+inline Ran runFathom(const std::string& arguments, const std::string& before = "") {
   const TemporaryFolder folder("output");
   const std::string command =
-      std::string(FATHOM_BINARY) + " " + arguments + " >'" + (folder / "out") + "' 2>'" + (folder / "err") + "'";
+      before + " " + FATHOM_BINARY + " " + arguments + " >'" + (folder / "out") + "' 2>'" + (folder / "err") + "'";
   const int status = std::system(command.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, textOf(folder / "out"), textOf(folder / "err")};
 }
