@@ -68,12 +68,14 @@ deep::DeepImage nineTenthsClean(const deep::DeepImage& image) {
   deep::DeepImage result = image.copy();
   for (deep::Channel& channel : result.channels) {
     const bool half = channel.name.starts_with("half0.") || channel.name.starts_with("half1.");
-    if ((!half && !channel.name.starts_with("variance.")) || channel.name.ends_with(".samples")) continue;
+    if (!half && !channel.name.starts_with("variance.")) continue;
     const std::span<const float> mean = half ? image.tryGet(channel.name.substr(6)) : std::span<const float>();
+    const float share = channel.name.ends_with(".samples") ? 0.5f : 1;
     for (size_t p = 0; p < window.area(); ++p) {
       const int x = window.x0 + int(p % size_t(window.width())), y = window.y0 + int(p / size_t(window.width()));
       if (kept.contains(x, y)) continue;
-      for (size_t s = image.offsets[p]; s < image.offsets[p + 1]; ++s) channel.values[s] = mean.empty() ? 0 : mean[s];
+      for (size_t s = image.offsets[p]; s < image.offsets[p + 1]; ++s)
+        channel.values[s] = mean.empty() ? 0 : share * mean[s];
     }
   }
   return result;
