@@ -11,27 +11,6 @@ namespace {
 // Gaussian of sigma 0.5 over three pixels; further ones weigh less than 4e-4.
 constexpr float kSide = 0.10650697891920f, kMiddle = 1 - 2 * kSide;
 
-void blurThenMaximum(flat::Padded& variance, int width, int height) {
-  variance.extend();
-  flat::Padded across(width, height, 1), blurred(width, height, 1);
-  parallelFor(0, height, [&](int y) {
-    const float* in = variance.row(y);
-    float* out = across.row(y);
-    for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (in[x - 1] + in[x + 1]);
-  });
-  across.extend();
-  parallelFor(0, height, [&](int y) {
-    const float *above = across.row(y - 1), *in = across.row(y), *below = across.row(y + 1);
-    float* out = blurred.row(y);
-    for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (above[x] + below[x]);
-  });
-  parallelFor(0, height, [&](int y) {
-    float* v = variance.row(y);
-    const float* b = blurred.row(y);
-    for (int x = 0; x < width; ++x) v[x] = std::max(v[x], b[x]);
-  });
-}
-
 // Where nothing tells the noise: the residual against the mean of the four neighbours, whose expectation for a smooth
 // image is 5/4 of the variance, averaged over 5x5 pixels.
 void estimateVariance(const flat::Padded& value, flat::Padded& variance, int width, int height) {
@@ -80,6 +59,28 @@ void flattenVariance(const DenoiseData& data, const Buffer<float>& variance, fla
 
 }  // namespace
 
+void prefilterVariance(flat::Padded& variance, int width, int height) {
+  variance.extend();
+  flat::Padded across(width, height, 1), blurred(width, height, 1);
+  parallelFor(0, height, [&](int y) {
+    const float* in = variance.row(y);
+    float* out = across.row(y);
+    for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (in[x - 1] + in[x + 1]);
+  });
+  across.extend();
+  parallelFor(0, height, [&](int y) {
+    const float *above = across.row(y - 1), *in = across.row(y), *below = across.row(y + 1);
+    float* out = blurred.row(y);
+    for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (above[x] + below[x]);
+  });
+  parallelFor(0, height, [&](int y) {
+    float* v = variance.row(y);
+    const float* b = blurred.row(y);
+    for (int x = 0; x < width; ++x) v[x] = std::max(v[x], b[x]);
+  });
+  variance.extend();
+}
+
 ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& component, int pad) {
   ComponentGuide guide;
   for (size_t c = 0; c < 3; ++c) {
@@ -105,8 +106,7 @@ ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& comp
     } else {
       estimateVariance(first, variance, data.width, data.height);
     }
-    blurThenMaximum(variance, data.width, data.height);
-    variance.extend();
+    prefilterVariance(variance, data.width, data.height);
   }
   return guide;
 }

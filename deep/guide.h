@@ -19,6 +19,9 @@ struct ComponentGuide {
 // `variance`: per bin and channel the variance of the mean of the component, used where there are no halves.
 ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& component, int pad);
 
+// Section 5.3: the maximum of a variance and its blurred self, in place; the border is extended.
+void prefilterVariance(flat::Padded& variance, int width, int height);
+
 // The flattened mean of a feature (over the pixel's alpha) and its variance, padded.
 struct FeatureGuide {
   Guide value;

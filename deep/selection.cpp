@@ -120,9 +120,33 @@ void blendWeights(const DenoiseData& data, float level, std::vector<flat::Padded
   for (flat::Padded& e : error) blur(data, e);
 }
 
+// The flattened halves blended, and the variance of each from their difference.
+ComponentGuide makePilot(const DenoiseData& data, const Candidates& candidates, const std::vector<flat::Padded>& parts,
+                         int pad) {
+  ComponentGuide pilot;
+  for (size_t c = 0; c < 3; ++c) {
+    for (size_t h = 0; h < 2; ++h) pilot.value[h].value[c] = flat::Padded(data.width, data.height, pad);
+    flat::Padded& variance = pilot.variance.value[c] = flat::Padded(data.width, data.height, pad);
+    parallelFor(0, data.height, [&](int y) {
+      for (int x = 0; x < data.width; ++x) {
+        std::array<float, 2> sum{};
+        for (size_t h = 0; h < 2; ++h) {
+          for (size_t k = 0; k < parts.size(); ++k)
+            sum[h] += parts[k].row(y)[x] * candidates.halves[k][h].value[c].row(y)[x];
+          pilot.value[h].value[c].row(y)[x] = sum[h];
+        }
+        variance.row(y)[x] = 0.5f * (sum[0] - sum[1]) * (sum[0] - sum[1]);
+      }
+    });
+    for (size_t h = 0; h < 2; ++h) pilot.value[h].value[c].extend();
+    prefilterVariance(variance, data.width, data.height);
+  }
+  return pilot;
+}
+
 }  // namespace
 
-Candidates::Candidates(const DenoiseData& data, int candidates) {
+Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) {
   const auto zeros = [&] {
     flat::Padded plane(data.width, data.height, std::max(kErrorRadius, kBlendRadius));
     for (int y = 0; y < data.height; ++y) std::fill_n(plane.row(y), data.width, 0.0f);
@@ -131,6 +155,10 @@ Candidates::Candidates(const DenoiseData& data, int candidates) {
   for (int k = 0; k < candidates; ++k) {
     value.emplace_back(data.bins() * 3, 0.0f);
     error.push_back(zeros());
+    if (!wantPilot) continue;
+    std::array<Guide, 2>& guides = halves.emplace_back();
+    for (Guide& guide : guides)
+      for (flat::Padded& plane : guide.value) plane = zeros();
   }
   for (int c = 0; c < 3; ++c) flattened.push_back(zeros());
 }
@@ -149,6 +177,9 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
                  data.weight[b], halves, candidates.value[size_t(k)].data() + 3 * b);
         candidates.error[size_t(k)].row(y)[x] =
             data.halves ? squaredError(halves) : squaredErrorOfWhole(halves, variance, x, y);
+        for (size_t h = 0; h < 2 && !candidates.halves.empty(); ++h)
+          for (size_t ch = 0; ch < 3; ++ch)
+            candidates.halves[size_t(k)][h].value[ch].row(y)[x] = halves.filtered[h][ch];
         for (size_t ch = 0; ch < 3; ++ch)
           candidates.flattened[ch].row(y)[x] +=
               (halves.filtered[0][ch] + halves.filtered[1][ch]) / float(2 * tile.candidates);
@@ -158,8 +189,7 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
   }
 }
 
-Buffer<float> blendCandidates(const DenoiseData& data, Candidates candidates, float level) {
-  if (candidates.value.size() == 1) return std::move(candidates.value[0]);
+Blend blendCandidates(const DenoiseData& data, Candidates candidates, float level, int pad) {
   for (flat::Padded& plane : candidates.error) plane.extend();
   for (flat::Padded& plane : candidates.flattened) plane.extend();
   std::vector<flat::Padded> smooth;
@@ -182,7 +212,9 @@ Buffer<float> blendCandidates(const DenoiseData& data, Candidates candidates, fl
       }
     }
   });
-  return std::move(candidates.value[0]);
+  Blend blend{std::move(candidates.value[0]), {}};
+  if (!candidates.halves.empty()) blend.pilot = makePilot(data, candidates, smooth, pad);
+  return blend;
 }
 
 }  // namespace fathom::deep

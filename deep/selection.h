@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "deep/denoise_data.h"
+#include "deep/guide.h"
 
 namespace fathom::deep {
 
@@ -24,10 +25,11 @@ inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
 struct Candidates {
   std::vector<Buffer<float>> value;  // [candidate], per bin 3
   std::vector<flat::Padded> error;   // [candidate], per pixel: estimated squared error of the flattened value, R + G +
-                                    // B; unbiased, so negative at times
-  std::vector<flat::Padded> flattened;  // [channel], per pixel: the mean of the candidates
+                                     // B; unbiased, so negative at times
+  std::vector<flat::Padded> flattened;       // [channel], per pixel: the mean of the candidates
+  std::vector<std::array<Guide, 2>> halves;  // [candidate][half]: flattened; only where a pilot is wanted
 
-  Candidates(const DenoiseData& data, int candidates);
+  Candidates(const DenoiseData& data, int candidates, bool wantPilot);
 };
 
 // Adds the sums of one tile, where the component is the c-th that was filtered. Pixels with still[pixel] != 0 are left
@@ -35,7 +37,13 @@ struct Candidates {
 void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
                    const FilterTile& tile, int c, const Buffer<uint8_t>& still, Candidates& candidates);
 
-// The blend of the candidates, per bin 3. Takes the candidates' storage. `level`: the mean colour of the frame.
-Buffer<float> blendCandidates(const DenoiseData& data, Candidates candidates, float level);
+struct Blend {
+  Buffer<float> value;  // per bin 3
+  ComponentGuide
+      pilot;  // where wanted: the flattened blend of each half and its two-buffer variance, for a second pass
+};
+
+// Blends the candidates and takes their storage. `level`: the mean colour of the frame; `pad`: the border of the pilot.
+Blend blendCandidates(const DenoiseData& data, Candidates candidates, float level, int pad);
 
 }  // namespace fathom::deep
