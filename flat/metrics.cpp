@@ -99,11 +99,14 @@ Sums pixelSums(const Pair& pair, size_t i) {
   return sums;
 }
 
-double pixelRelative(const Pair& pair, size_t i) {
+// The relative squared error of a pixel, summed over channels, less the reference's own if that is to be taken off.
+double pixelRelative(const Pair& pair, size_t i, bool correct) {
   double sum = 0;
-  for (size_t c = 0; c < 3; ++c)
-    sum += square(double(pair.image[c][i]) - pair.reference[c][i]) / (square(pair.reference[c][i]) + kDark);
-  return sum / 3;
+  for (size_t c = 0; c < 3; ++c) {
+    const double r = pair.reference[c][i], own = correct ? ownVariance(pair, c, i) : 0;
+    sum += (square(pair.image[c][i] - r) - own) / (square(r) + kDark);
+  }
+  return sum;
 }
 
 // Row sums in parallel, added in row order.
@@ -124,7 +127,7 @@ Sum sumPixels(const Pair& pair, const std::vector<uint8_t>& used, const AtPixel&
 std::vector<uint8_t> withoutWorst(const Pair& pair, double share) {
   std::vector<std::pair<double, size_t>> order;
   for (size_t i = 0; i < pair.used.size(); ++i)
-    if (pair.used[i]) order.emplace_back(-pixelRelative(pair, i), i);
+    if (pair.used[i]) order.emplace_back(-pixelRelative(pair, i, false), i);
   const size_t worst = size_t(share * double(order.size()));
   std::nth_element(order.begin(), order.begin() + long(worst), order.end());
   std::vector<uint8_t> used = pair.used;
@@ -150,12 +153,13 @@ Metrics compare(const Image& image, const Image& reference, const MetricParams& 
 
   const std::vector<uint8_t> kept = withoutWorst(pair, params.trimmed);
   const size_t keptPixels = size_t(std::count(kept.begin(), kept.end(), 1));
-  const Sums keptSums = sumPixels<Sums>(pair, kept, [&](size_t i) { return pixelSums(pair, i); });
+  const double keptRelative =
+      sumPixels<double>(pair, kept, [&](size_t i) { return pixelRelative(pair, i, params.correct); });
 
   Metrics result;
   const double correction = params.correct ? 1 : 0;
   result.relMse = (sums.relative - correction * sums.ownRelative) / values;
-  result.relMseTrimmed = (keptSums.relative - correction * keptSums.ownRelative) / (3 * double(keptPixels));
+  result.relMseTrimmed = keptRelative / (3 * double(keptPixels));
   result.mse = (sums.squared - correction * sums.own) / values;
   result.psnr = sums.mapped > 0 ? -10 * std::log10(sums.mapped / values) : std::numeric_limits<double>::infinity();
   result.smape = sums.symmetric / values;
@@ -171,7 +175,7 @@ Plane relativeError(const Image& image, const Image& reference) {
   const Pair pair = makePair(image, reference, {});
   Plane result{"error", Buffer<float>(pair.used.size(), std::numeric_limits<float>::quiet_NaN())};
   for (size_t i = 0; i < pair.used.size(); ++i)
-    if (pair.used[i]) result.values[i] = float(std::sqrt(pixelRelative(pair, i)));
+    if (pair.used[i]) result.values[i] = float(std::sqrt(pixelRelative(pair, i, false) / 3));
   return result;
 }
 
