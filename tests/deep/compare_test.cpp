@@ -174,7 +174,8 @@ TEST(DeepCompare, PartsSumToTheWhole) {
 }
 
 TEST(DeepCompare, TheMedianDepthHalvesTheAlpha) {
-  EXPECT_EQ(medianDepth(makeGrey({{{1, 1, 0.75f, 0, 0}, {2, 2, 1, 0, 0}}}, 1)), 1);
+  EXPECT_EQ(medianDepth(makeGrey({{{1, 1, 0.5f, 0, 0}, {2, 2, 1, 0, 0}}}, 1)), 1);
+  EXPECT_EQ(medianDepth(makeGrey({{{1, 1, 0.49f, 0, 0}, {2, 2, 1, 0, 0}}}, 1)), 2);
   EXPECT_EQ(medianDepth(makeGrey({{{1, 1, 0.25f, 0, 0}, {2, 2, 1, 0, 0}}, {{9, 9, 0, 0, 0}}}, 2)), 2);
   EXPECT_THROW(medianDepth(makeGrey({{{1, 1, 0, 0, 0}}}, 1)), Error);
 }

@@ -162,6 +162,14 @@ TEST(Metrics, PixelsThatAreNotFiniteAreCountedAndHaveNoSay) {
   EXPECT_THAT(errorOf(broken, makeImage(3, 3)), HasSubstr("found none that are finite"));
 }
 
+TEST(Metrics, PixelsThatAreNotFiniteLeaveTheWindowsAroundThemAlone) {
+  Image image = makeImage(20, 16, 0.75f);
+  const Image reference = makeImage(20, 16, 0.5f);
+  const double whole = compare(image, reference).ssim;
+  image.planes[1].values[170] = kNan;
+  EXPECT_NEAR(compare(image, reference).ssim, whole, 1e-9);
+}
+
 TEST(Metrics, OnlyCoveredPixelsWhenAsked) {
   Image reference = makeImage(10, 10, 0.5f), image = makeImage(10, 10, 0.5f);
   reference.add("A", 0).values[44] = 0.25f;
@@ -191,6 +199,14 @@ TEST(Metrics, AnErrorThatStandsStillDoesNotFlicker) {
   const Image reference0 = makeImage(20, 20, 0.25f), reference1 = makeImage(20, 20, 0.5f);
   EXPECT_EQ(flicker(makeImage(20, 20, 0.5f), reference0, makeImage(20, 20, 0.75f), reference1), 0);
   EXPECT_DOUBLE_EQ(flicker(makeImage(20, 20, 0.25f), reference0, makeImage(20, 20, 0.75f), reference1), 0.0625 / 0.26);
+}
+
+TEST(Metrics, FlickerNeedsBothFramesFiniteAndTakesBothVariancesOff) {
+  Image before = makeImage(20, 20, 0.25f), after = makeImage(20, 20, 0.75f), reference = makeImage(20, 20, 0.5f);
+  before.planes[0].values[7] = after.planes[2].values[8] = kNan;
+  EXPECT_DOUBLE_EQ(flicker(before, reference, after, reference), 0.25 / 0.26);
+  addVariance(reference, 0.03125f);
+  EXPECT_NEAR(flicker(before, reference, after, reference, {.correct = true}), 0.1875 / 0.26, 1e-12);
 }
 
 TEST(Metrics, IndependentErrorsFlickerTwice) {
