@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <map>
 
+#include "cli/bands.h"
 #include "cli/commands.h"
 #include "deep/io.h"
 #include "flat/error.h"
@@ -108,7 +109,7 @@ void run(const ConvertParams& params) {
   }
   const Box& window = part.dataWindow;
   Types types(params);
-  deep::DeepImage layout = reader.read(window.y0, window.y0);
+  deep::DeepImage layout = readLayout(reader);
   types.apply(layout);
   deep::Writer writer(params.output, layout, window, options);
   for (int y = window.y0; y < window.y1;) {

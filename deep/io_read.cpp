@@ -112,6 +112,8 @@ struct Reader::Impl {
     // The table is in file order: a tile's place does not depend on the line order, a row's neither.
     const uint64_t at = table.at(size_t(ty) * size_t(columns) + size_t(tx));
     if (at == 0) fail("{}: missing: the file was not finished", name(chunk));
+    if (at > file.bytes().size())
+      fail("{}: damaged or truncated: expected at byte {} of a file of {}", name(chunk), at, file.bytes().size());
     readChunkHead(chunk, at, {tx, ty, 0, 0});
     return chunk;
   }

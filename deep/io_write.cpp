@@ -172,7 +172,7 @@ struct Writer::Impl {
     uint64_t copied = 0;
     Bytes chunk;
     for (uint64_t& at : table) {
-      if (at == 0) fail("{}: cannot copy: the part was not finished", other.where(part));
+      if (at == 0 || at > other.bytes().size()) fail("{}: cannot copy: the part was not finished", other.where(part));
       chunk.resize(size_t(std::min(chunkBytes(other, part, at), other.bytes().size())));
       copied += chunk.size();
       if (copied > other.bytes().size()) fail("{}: expected chunks apart, found some that overlap", other.where(part));

@@ -26,6 +26,7 @@ Bytes load(const std::string& path) {
 }
 
 void run(const Bytes& bytes) {
+  std::remove("fuzz-input.bin");
   std::ofstream("fuzz-input.bin", std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
