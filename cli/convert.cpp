@@ -26,8 +26,6 @@ struct ConvertParams {
   Patterns channels, toHalf, toFloat;  // globs
 };
 
-constexpr size_t kBandBytes = size_t(256) << 20;
-
 bool matches(const Patterns& patterns, const std::string& name) {
   for (const std::string& pattern : patterns)
     if (fnmatch(pattern.c_str(), name.c_str(), 0) == 0) return true;
@@ -107,18 +105,14 @@ void run(const ConvertParams& params) {
     options.otherPartsOf = params.input;
     options.replacedPart = part.number;
   }
-  const Box& window = part.dataWindow;
   Types types(params);
   deep::DeepImage layout = readLayout(reader);
   types.apply(layout);
-  deep::Writer writer(params.output, layout, window, options);
-  for (int y = window.y0; y < window.y1;) {
-    const int end = reader.bandEnd(y, kBandBytes);
-    deep::DeepImage band = reader.read(y, end);
+  deep::Writer writer(params.output, layout, part.dataWindow, options);
+  forEachBand(reader, [&](deep::DeepImage band) {
     types.apply(band);
     writer.write(band);
-    y = end;
-  }
+  });
   writer.finish();
   types.report(params.output);
 }

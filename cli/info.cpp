@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "cli/bands.h"
 #include "cli/commands.h"
 #include "deep/denoise.h"
 #include "deep/io.h"
@@ -34,20 +35,13 @@ struct Part {
   std::vector<std::string> missing;
 };
 
-constexpr size_t kBandBytes = size_t(64) << 20;
-
 deep::Statistics gather(const std::string& file, int part) {
   deep::ReadOptions options;
   options.part = std::to_string(part);
   options.channels = [](const std::string& name) { return name == "Z" || name == "ZBack"; };
   deep::Reader reader(file, options);
   deep::Statistics statistics;
-  const Box& window = reader.part().dataWindow;
-  for (int y = window.y0; y < window.y1;) {
-    const int end = reader.bandEnd(y, kBandBytes);
-    statistics.add(reader.read(y, end));
-    y = end;
-  }
+  forEachBand(reader, [&](const deep::DeepImage& band) { statistics.add(band); });
   return statistics;
 }
 
