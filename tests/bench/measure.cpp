@@ -30,12 +30,11 @@ size_t statusBytes(const std::string& key) {
   fail("/proc/self/status: expected a line {}, found none", key);
 }
 
-std::string text(const Cell& cell) {
-  if (const auto* string = std::get_if<std::string>(&cell)) return *string;
-  return fmt::format("{:.3g}", std::get<double>(cell));
-}
-
 }  // namespace
+
+std::string Cell::text() const {
+  return number_ ? fmt::format("{:.3g}", *number_) : word_;
+}
 
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -65,7 +64,7 @@ void Table::print() const {
   std::vector<size_t> widths;
   for (size_t c = 0; c < columns_.size(); ++c) {
     widths.push_back(columns_[c].size());
-    for (const auto& row : rows_) widths[c] = std::max(widths[c], text(row[c]).size());
+    for (const auto& row : rows_) widths[c] = std::max(widths[c], row[c].text().size());
   }
   fmt::print("\n{}\n\n", title_);
   const auto line = [&](auto&& cell) {
@@ -74,7 +73,7 @@ void Table::print() const {
   };
   line([&](size_t c) { return columns_[c]; });
   line([&](size_t c) { return std::string(widths[c], '-'); });
-  for (const auto& row : rows_) line([&](size_t c) { return text(row[c]); });
+  for (const auto& row : rows_) line([&](size_t c) { return row[c].text(); });
   std::fflush(stdout);
 }
 
@@ -85,7 +84,10 @@ void writeJson(const std::string& path, const std::vector<Table>& tables) {
     for (const auto& row : table.rows()) {
       nlohmann::ordered_json object;
       for (size_t c = 0; c < row.size(); ++c)
-        std::visit([&](const auto& value) { object[table.columns()[c]] = value; }, row[c]);
+        if (auto& value = object[table.columns()[c]]; row[c].number())
+          value = *row[c].number();
+        else
+          value = row[c].text();
       rows.push_back(std::move(object));
     }
   }

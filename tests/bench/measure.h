@@ -3,8 +3,9 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
-#include <variant>
+#include <utility>
 #include <vector>
 
 namespace fathom::bench {
@@ -18,9 +19,22 @@ double median(std::vector<double> values);
 // How many bytes the process grew by at most while `work` ran (resident set; Linux keeps its peak).
 size_t peakGrowth(const std::function<void()>& work);
 
-using Cell = std::variant<std::string, double>;
+// A word or a number; numbers are printed with three significant digits.
+class Cell {
+ public:
+  Cell(std::string word) : word_(std::move(word)) {}
+  Cell(const char* word) : word_(word) {}
+  Cell(double number) : number_(number) {}
 
-// Columns carry their unit in their name ("s/MP"); doubles are printed with three significant digits.
+  std::string text() const;
+  const std::optional<double>& number() const { return number_; }
+
+ private:
+  std::string word_;
+  std::optional<double> number_;
+};
+
+// Columns carry their unit in their name ("s/MP").
 class Table {
  public:
   Table(std::string title, std::vector<std::string> columns) : title_(std::move(title)), columns_(std::move(columns)) {}
