@@ -4,6 +4,7 @@ set -euo pipefail
 fathom=$1
 out=out/demo
 frame=0002
+rm -rf "$out"
 mkdir -p "$out"
 
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
@@ -28,9 +29,9 @@ run compare "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.deepref.exr" -
 
 say "Pictures: noisy, denoised, reference"
 run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.ref.exr" \
-  --labels noisy,denoised,reference -o "$out/frame.png"
+  --labels noisy,denoised,reference --zoom 2 --exposure -0.7 -o "$out/frame.png"
 run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.deepref.exr" --clip 0,7 \
-  --labels noisy,denoised,reference -o "$out/clipped.png"
+  --labels noisy,denoised,reference --zoom 2 --exposure -0.7 -o "$out/clipped.png"
 
 cat <<TEXT
 
