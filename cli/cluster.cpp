@@ -7,6 +7,7 @@
 
 #include "cli/bands.h"
 #include "cli/commands.h"
+#include "deep/channels.h"
 #include "deep/cluster.h"
 #include "deep/ppu_scale.h"
 #include "flat/error.h"
@@ -70,19 +71,22 @@ void runCluster(const ClusterCommand& command) {
   if (command.ppuScale > 0) head.attributes.set("fathom:ppuScale", command.ppuScale);
   const deep::PartInfo& part = reader.part();
   deep::Writer writer(command.output, head, part.dataWindow, likeInput(command.input, part));
-  size_t samples = 0, bins = 0, lost = 0;
+  size_t samples = 0, bins = 0, lost = 0, nonFinite = 0;
   forEachBand(reader, [&](const deep::DeepImage& band) {
     const deep::BinLayout layout = layouts.of(band);
     const deep::DeepImage result = clustered(band, layout);
     samples += band.samples();
     bins += result.samples();
     lost += countLost(band, layout);
+    nonFinite += deep::countNonFinite(band);
     writer.write(result);
   });
   writer.finish();
   fmt::print("{}: {} bins of {} samples, {:.2f} bins per pixel\n", command.output, bins, samples,
              double(bins) / double(std::max<size_t>(part.dataWindow.area(), 1)));
   if (lost > 0) fmt::print("{} samples lie in pixels without bins in {}: left out\n", lost, command.prepass);
+  if (nonFinite > 0)
+    fmt::print("{}: {} samples with values that are not finite: left out of the means\n", command.input, nonFinite);
 }
 
 }  // namespace

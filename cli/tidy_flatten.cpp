@@ -6,6 +6,7 @@
 
 #include "cli/bands.h"
 #include "cli/commands.h"
+#include "deep/channels.h"
 #include "deep/flatten.h"
 #include "deep/tidy.h"
 #include "flat/io.h"
@@ -66,13 +67,17 @@ void runFlatten(const FileParams& params) {
   flat::Image result = about(params.input, [&] { return deep::flatten(readLayout(reader)); });
   result.dataWindow = reader.part().dataWindow;
   for (flat::Plane& plane : result.planes) plane.values = Buffer<float>(result.dataWindow.area());
+  size_t nonFinite = 0;
   forEachBand(reader, [&](const deep::DeepImage& band) {
+    nonFinite += deep::countNonFinite(band);
     const flat::Image rows = about(params.input, [&] { return deep::flatten(band); });
     const size_t first = result.dataWindow.index(band.dataWindow.x0, band.dataWindow.y0);
     for (size_t c = 0; c < rows.planes.size(); ++c)
       std::copy(rows.planes[c].values.begin(), rows.planes[c].values.end(), result.planes[c].values.begin() + first);
   });
   flat::write(params.output, result);
+  if (nonFinite > 0)
+    fmt::print("{}: {} samples with values that are not finite: taken for 0\n", params.input, nonFinite);
 }
 
 }  // namespace

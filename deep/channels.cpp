@@ -1,5 +1,10 @@
 #include "deep/channels.h"
 
+#include <algorithm>
+#include <vector>
+
+#include "deep/volume.h"
+
 namespace fathom::deep {
 
 Role roleOf(std::string_view name, PixelType type) {
@@ -11,6 +16,16 @@ Role roleOf(std::string_view name, PixelType type) {
   if (name.starts_with("half0.") || name.starts_with("half1.")) return Role::Half;
   if (name == "coc" || name == "time" || name.starts_with("lens.")) return Role::Plain;
   return Role::Premultiplied;
+}
+
+size_t countNonFinite(const DeepImage& image) {
+  std::vector<bool> found(image.samples(), false);
+  for (const Channel& channel : image.channels) {
+    if (roleOf(channel) != Role::Premultiplied) continue;
+    for (size_t i = 0; i < found.size(); ++i)
+      if (!isFinite(channel.values[i])) found[i] = true;
+  }
+  return size_t(std::count(found.begin(), found.end(), true));
 }
 
 }  // namespace fathom::deep

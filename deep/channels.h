@@ -29,4 +29,7 @@ inline bool describesSamples(Role role) {
   return role == Role::Half || role == Role::Statistic;
 }
 
+// How many samples hold a premultiplied value that compositing takes for 0 (see finiteOrZero).
+size_t countNonFinite(const DeepImage& image);
+
 }  // namespace fathom::deep

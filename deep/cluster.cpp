@@ -65,7 +65,7 @@ void removePoisoned(const std::vector<Output>& outputs, size_t firstSample, Clus
     if (output.what != Statistic::Mean) continue;
     const float* values = output.in->values.data() + firstSample;
     for (size_t i = 0; i < plan.bin.size(); ++i)
-      if (!(std::abs(values[i]) <= 1e15f)) plan.weight[i] = plan.factor[i] = 0;
+      if (!isFinite(values[i])) plan.weight[i] = plan.factor[i] = 0;
   }
 }
 

@@ -15,9 +15,12 @@ inline double opacity(float alpha) {
   return alpha > 0 ? (alpha < 1 ? double(alpha) : 1.0) : 0.0;
 }
 
-// What compositing makes of a colour: non-finite values and magnitudes above 1e15 are 0.
+// Whether a colour has a use: magnitudes above 1e15 count as non-finite. Compositing takes what has none for 0.
+inline bool isFinite(float value) {
+  return std::abs(value) <= 1e15f;
+}
 inline float finiteOrZero(float value) {
-  return std::abs(value) <= 1e15f ? value : 0.0f;
+  return isFinite(value) ? value : 0.0f;
 }
 
 // Depths as compositing takes them. A range that is not finite or not positive in length is a point at `z`; a depth

@@ -137,6 +137,17 @@ TEST(ClusterCommand, GathersSamplesIntoBins) {
   EXPECT_EQ(deep::read(folder / "all.exr").samples(), 160u);
 }
 
+TEST(FlattenCommand, CountsValuesThatAreNotFinite) {
+  const TemporaryFolder folder;
+  DeepImage image = untidy();
+  const size_t last = image.samples() - 1;
+  image.get("R")[0] = image.get("B")[0] = image.get("B")[last] = std::numeric_limits<float>::quiet_NaN();
+  deep::write(folder / "in.exr", image);
+  EXPECT_THAT(runFathom("flatten " + (folder / "in.exr") + " -o " + (folder / "out.exr")).out, HasSubstr(" 2 samples"));
+  EXPECT_THAT(runFathom("cluster --ppu-scale 9 " + (folder / "in.exr") + " -o " + (folder / "bins.exr")).out,
+              HasSubstr(" 2 samples"));
+}
+
 TEST(ClusterCommand, SaysHowToGiveTheScale) {
   const TemporaryFolder folder;
   deep::write(folder / "in.exr", cameraSamples());
