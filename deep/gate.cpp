@@ -17,7 +17,7 @@ namespace fathom::deep {
 
 // The neighbours of one bin, a plane per value.
 struct GateNeighbours {
-  static constexpr size_t kMost = 64;  // 49, and a vector more
+  static constexpr size_t kMost = 64;  // 49, in whole vectors
   alignas(64) float value[11][kMost];  // filtered 0-2, samples 3, residual 4-6, variance 7-9, reach 10
   size_t count = 0;
 };
@@ -37,7 +37,7 @@ float GateOf(const GateBin& bin, GateNeighbours& n, float floor) {
   const size_t N = hn::Lanes(d);
   auto weight = hn::Zero(d), square = hn::Zero(d);
   hn::Vec<decltype(d)> residual[3] = {weight, weight, weight}, variance[3] = {weight, weight, weight};
-  for (size_t i = n.count; i < n.count + N; ++i)
+  for (size_t i = n.count; i % N != 0; ++i)
     for (auto& plane : n.value) plane[i] = 0;
   for (size_t i = 0; i < n.count; i += N) {
     auto distance = hn::Zero(d);
