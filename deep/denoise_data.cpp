@@ -1,6 +1,6 @@
 #include "deep/denoise_data.h"
 
-#include <atomic>
+#include <algorithm>
 #include <cmath>
 
 #include "deep/alpha.h"
@@ -42,6 +42,8 @@ float unpremultiply(float alpha) {
 
 void fillCounts(const DeepImage& image, const DenoiseInputs& inputs, DenoiseData& data) {
   data.weight = effectiveAlpha(image);
+  for (float& weight : data.weight)
+    if (weight < kLeastShare) weight = 0;
   data.count = Buffer<float>(data.bins());
   const std::span<const float> samples = inputs.counts ? image.get("samples") : std::span<const float>();
   const float spp = float(inputs.spp > 0 ? inputs.spp : kAssumedSpp);
@@ -122,8 +124,8 @@ std::vector<Buffer<float>> componentVariance(const DeepImage& image, const Denoi
   return result;
 }
 
-void readComponent(const DeepImage& image, const DenoiseInputs& inputs, const std::string& name, DenoiseData& data,
-                   std::atomic<uint64_t>& nonFinite) {
+void readComponent(const DeepImage& image, const DenoiseInputs& inputs, const std::string& name,
+                   const Buffer<uint8_t>& nonFinite, DenoiseData& data) {
   DenoiseComponent component{name, name == "diffuse" && inputs.albedo, Buffer<float>(data.bins() * 8), {}};
   const std::string group = name.empty() ? "" : name + ".";
   const std::span<const float> alpha = image.get("A");
@@ -137,11 +139,10 @@ void readComponent(const DeepImage& image, const DenoiseInputs& inputs, const st
   const std::span<const float> n0 = inputs.halfCounts ? image.get("half0.samples") : std::span<const float>();
   const std::span<const float> n1 = inputs.halfCounts ? image.get("half1.samples") : std::span<const float>();
   forBins(data, [&](size_t b) {
-    const float inverse = unpremultiply(alpha[b]);
+    const float inverse = nonFinite[b] ? 0 : unpremultiply(alpha[b]);
     const std::array<float, 2> weights =
         data.halves ? halfWeights(data.weight[b], n0, n1, b) : std::array{data.weight[b], 0.0f};
     float* out = component.data.data() + 8 * b;
-    bool bad = false;
     for (size_t h = 0; h < 2; ++h) {
       float w = inverse > 0 ? weights[h] : 0;
       std::array<float, 3> value{};
@@ -151,26 +152,39 @@ void readComponent(const DeepImage& image, const DenoiseInputs& inputs, const st
         value[c] = v;
       }
       if (!usable(value[0]) || !usable(value[1]) || !usable(value[2])) {
-        bad = true;
         value = {};
         w = 0;
       }
       for (size_t c = 0; c < 3; ++c) out[4 * h + c] = value[c] * w;
       out[4 * h + 3] = w;
     }
-    if (bad) nonFinite.fetch_add(1, std::memory_order_relaxed);
   });
   if (!data.halves && inputs.variance) component.variance = componentVariance(image, component, data);
   data.components.push_back(std::move(component));
 }
 
-}  // namespace
-
-std::array<float, 3> meanOf(const float* data) {
-  const float w = data[3] + data[7];
-  if (!(w > 0)) return {0, 0, 0};
-  return {(data[0] + data[4]) / w, (data[1] + data[5]) / w, (data[2] + data[6]) / w};
+// 1 for bins with a colour that is not finite, in whichever of the channels that tell it.
+Buffer<uint8_t> findNonFinite(const DeepImage& image, const DenoiseInputs& inputs, const DenoiseData& data) {
+  std::vector<std::string> groups{""};
+  for (const char* component : {"diffuse.", "specular."})
+    if (inputs.components) groups.push_back(component);
+  std::vector<std::span<const float>> colours;
+  for (const std::string& group : groups)
+    for (const char* half : {"", "half0.", "half1."}) {
+      const bool read = *half == 0 || (inputs.halves && inputs.components != group.empty());
+      for (const char* rgb : kRgb)
+        if (read) colours.push_back(image.get(half + group + rgb));
+    }
+  const std::span<const float> alpha = image.get("A");
+  Buffer<uint8_t> result(data.bins(), 0);
+  forBins(data, [&](size_t b) {
+    const float scale = data.weight[b] > 0 ? unpremultiply(alpha[b]) : 1;
+    for (const std::span<const float>& colour : colours) result[b] |= !usable(colour[b] * scale);
+  });
+  return result;
 }
+
+}  // namespace
 
 DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs) {
   DenoiseData data;
@@ -180,14 +194,14 @@ DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs) 
   data.offsets = image.offsets.data();
   data.halves = inputs.halves;
   fillCounts(image, inputs, data);
-  std::atomic<uint64_t> nonFinite = 0;
+  const Buffer<uint8_t> nonFinite = findNonFinite(image, inputs, data);
+  data.nonFinite = uint64_t(std::count(nonFinite.begin(), nonFinite.end(), 1));
   if (inputs.components) {
-    readComponent(image, inputs, "diffuse", data, nonFinite);
-    readComponent(image, inputs, "specular", data, nonFinite);
+    readComponent(image, inputs, "diffuse", nonFinite, data);
+    readComponent(image, inputs, "specular", nonFinite, data);
   } else {
-    readComponent(image, inputs, "", data, nonFinite);
+    readComponent(image, inputs, "", nonFinite, data);
   }
-  data.nonFinite = nonFinite;
   if (inputs.albedo) data.albedo = readFeature(image, "albedo.", kRgb, inputs.albedoVariance, data);
   if (inputs.normal) data.normal = readFeature(image, "N.", kXyz, inputs.normalVariance, data);
   data.depth = readDepth(image, inputs, data);

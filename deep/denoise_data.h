@@ -18,6 +18,10 @@ inline constexpr float kAlbedoOffset = 0.03f;
 // Colours of larger magnitude count as non-finite (DATA.md).
 inline constexpr float kLargest = 1e15f;
 
+// Bins with less effective alpha (emission, or behind something opaque) have no say and keep their colours: nothing of
+// them is seen, and what little is seen of their neighbours must not be taken for theirs.
+inline constexpr float kLeastShare = 1e-6f;
+
 // A feature over all bins: up to three channels of values, and the variances of those means.
 struct Feature {
   std::vector<Buffer<float>> value, variance;
@@ -36,11 +40,11 @@ struct DenoiseData {
   int width = 0, height = 0, rowPhase = 0;
   const uint64_t* offsets = nullptr;
   bool halves = false;   // block 0 and 1 are half buffers; else block 0 has all samples and block 1 nothing
-  Buffer<float> weight;  // per bin: its effective alpha
+  Buffer<float> weight;  // per bin: its effective alpha, 0 where that is below kLeastShare
   Buffer<float> count;   // per bin: camera samples that fell in it
   std::vector<DenoiseComponent> components;
   Feature albedo, normal, depth;  // without channels where the file has none; depth is the logarithm
-  uint64_t nonFinite = 0;         // bins with a colour that is not finite
+  uint64_t nonFinite = 0;         // bins with a colour that is not finite: no component has data of them
 
   size_t bins() const { return size_t(offsets[size_t(width) * size_t(height)]); }
 };
@@ -48,8 +52,5 @@ struct DenoiseData {
 // Reads what the plan says is there; throws Error by the name of a channel that is missing. `image` must outlive the
 // result.
 DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs);
-
-// The mean of the colours of both blocks of a bin, from 8 values of `data`; 0 where neither has samples.
-std::array<float, 3> meanOf(const float* data);
 
 }  // namespace fathom::deep
