@@ -152,17 +152,42 @@ std::vector<Blend> filterComponents(const DenoiseData& data, const FeatureInput&
   return result;
 }
 
-// The variance of one sample of a bin: from the file, else from the halves, else from what the flattened image tells.
-float sampleVariance(const DenoiseData& data, const std::array<std::span<const float>, 3>& variance, size_t bin,
-                     size_t c) {
+// The variance of one camera sample, from what the flattened guides tell of their pixels: sum of w^2 / n times it is
+// the pixel's. Per component and channel; nothing where halves or the file tell it by bin.
+std::vector<std::array<Buffer<float>, 3>> pixelVariance(const DenoiseData& data, std::span<const ComponentGuide> guides,
+                                                        const DenoiseInputs& inputs) {
+  std::vector<std::array<Buffer<float>, 3>> result;
+  if (inputs.halves || inputs.variance) return result;
+  const size_t width = size_t(data.width);
+  for (const ComponentGuide& guide : guides) {
+    auto& planes = result.emplace_back();
+    for (Buffer<float>& plane : planes) plane = Buffer<float>(width * size_t(data.height));
+    parallelFor(0, data.height, [&](int y) {
+      for (size_t x = 0; x < width; ++x) {
+        const size_t pixel = size_t(y) * width + x;
+        float scale = 0;
+        for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
+          if (data.count[b] > 0) scale += data.weight[b] * data.weight[b] / data.count[b];
+        for (size_t c = 0; c < 3; ++c)
+          planes[c][pixel] = scale > 0 ? std::min(guide.variance.value[c].row(y)[x] / scale, kLargest) : 0;
+      }
+    });
+  }
+  return result;
+}
+
+// The same of a bin: from the file, else from the halves, else the pixel's.
+float sampleVariance(const DenoiseData& data, const std::array<std::span<const float>, 3>& variance,
+                     std::span<const std::array<Buffer<float>, 3>> ofPixels, size_t pixel, size_t bin, size_t c) {
   if (!variance[c].empty())
     return variance[c][bin] > 0 && variance[c][bin] <= kLargest ? variance[c][bin] * data.count[bin] : 0;
   float sum = 0;
-  for (const DenoiseComponent& component : data.components) {
-    const float* v = component.data.data() + 8 * bin;
+  for (size_t i = 0; i < data.components.size(); ++i) {
+    const float* v = data.components[i].data.data() + 8 * bin;
+    const float scale = data.components[i].perAlbedo ? data.albedo.value[c][bin] + kAlbedoOffset : 1;
+    if (!ofPixels.empty()) sum += scale * scale * ofPixels[i][c][pixel];
     if (!(v[3] > 0) || !(v[7] > 0)) continue;
-    float e = v[c] / v[3] - v[4 + c] / v[7];
-    if (component.perAlbedo) e *= data.albedo.value[c][bin] + kAlbedoOffset;
+    const float e = scale * (v[c] / v[3] - v[4 + c] / v[7]);
     const float share = v[3] / (v[3] + v[7]);
     sum += share * (1 - share) * e * e * data.count[bin];
   }
@@ -172,7 +197,8 @@ float sampleVariance(const DenoiseData& data, const std::array<std::span<const f
 // Section 5.2 backwards: albedo multiplied back, components added. Fills what the gate needs, with the noisy colour
 // from the image.
 void compose(const DeepImage& image, const DenoiseData& data, const DenoiseInputs& inputs, const Buffer<uint8_t>& still,
-             std::vector<Blend>& filtered, Buffer<GateBin>& bins) {
+             std::span<const std::array<Buffer<float>, 3>> ofPixels, std::vector<Blend>& filtered,
+             Buffer<GateBin>& bins) {
   const std::span<const float> alpha = image.get("A");
   const std::array<std::span<const float>, 3> noisy{image.get("R"), image.get("G"), image.get("B")};
   std::array<std::span<const float>, 3> variance;
@@ -195,17 +221,17 @@ void compose(const DeepImage& image, const DenoiseData& data, const DenoiseInput
           finite = finite && std::fabs(y0) <= kLargest;
           bin.filtered[c] = still[pixel] ? y0 : sum;
           bin.residual[c] = y0 - bin.filtered[c];
-          bin.variance[c] = sampleVariance(data, variance, b, c);
+          bin.variance[c] = sampleVariance(data, variance, ofPixels, pixel, b, c);
         }
-        bin.samples = inverse > 0 && finite ? data.count[b] : 0;
+        bin.samples = data.weight[b] > 0 && finite ? data.count[b] : 0;
         if (!finite) std::fill_n(bin.residual, 3, 0.0f);
       }
     }
   });
 }
 
-// The result, premultiplied again: f + k (y - f), by component and whole. Emission (A = 0) and still pixels stay as
-// they are.
+// The result, premultiplied again: f + k (y - f), by component and whole. Still pixels stay as they are, and bins
+// without a weight, which nothing could fill: what is not finite there becomes 0.
 void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_t>& still,
                   std::span<const Blend> filtered, const Buffer<float>& gate) {
   const std::span<const float> alpha = image.get("A");
@@ -217,9 +243,14 @@ void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_
       part.push_back(component.name.empty() ? whole : image.get(component.name + "." + kRgb[c]));
     parallelFor(0, data.height, [&](int y) {
       for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel) {
-        if (still[pixel]) continue;
         for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
-          if (!(alpha[b] > 0)) continue;
+          if (!(data.weight[b] > 0)) {
+            for (std::span<float>& values : part)
+              if (!(std::fabs(values[b]) <= kLargest)) values[b] = 0;
+            if (!(std::fabs(whole[b]) <= kLargest)) whole[b] = 0;
+            continue;
+          }
+          if (still[pixel]) continue;
           float sum = 0;
           for (size_t i = 0; i < part.size(); ++i) {
             const float f = filtered[i].value[3 * b + c] * std::min(alpha[b], 1.0f);
@@ -291,6 +322,7 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   clock.lap("guides");
   progress.at(0.15);
 
+  const std::vector<std::array<Buffer<float>, 3>> ofPixels = pixelVariance(data, guides, plan.inputs);
   TileCount count(data, progress, 0.15, twice ? 0.35 : 0.85);
   std::vector<Blend> blends =
       filterComponents(data, features, guides, activity, bank, plan.level, twice ? guideBorder(second) : 0, count);
@@ -306,7 +338,7 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   guides.clear();
   progress.at(0.85);
   Buffer<GateBin> bins(data.bins());
-  compose(image, data, plan.inputs, activity.still, blends, bins);
+  compose(image, data, plan.inputs, activity.still, ofPixels, blends, bins);
   clock.lap("compose");
   const Buffer<float> k =
       plan.params.gate ? gate(data, bins, activity.still, plan.level) : Buffer<float>(data.bins(), 0.0f);

@@ -35,6 +35,17 @@ bool filteredHalves(const float* sums, std::array<Rgb, 2>& value) {
   return true;
 }
 
+// A candidate that found nothing for a bin takes the next one's value: colour weights find no one where a pixel is not
+// finite, feature weights do.
+void fillFromOthers(const FilterTile& tile, size_t i, int c, size_t bin, std::vector<Buffer<float>>& value) {
+  int known = -1;
+  const auto says = [&](int k) { return tile.at(i, c, k)[3] > kLeastWeight || tile.at(i, c, k)[7] > kLeastWeight; };
+  for (int k = 0; k < tile.candidates; ++k)
+    if (says(k)) known = k;
+  for (int k = 0; k < tile.candidates && known >= 0; ++k)
+    if (!says(k)) std::copy_n(value[size_t(known)].data() + 3 * bin, 3, value[size_t(k)].data() + 3 * bin);
+}
+
 // Adds one bin of one candidate; `in` is the bin's noisy data.
 void addBin(const float* in, const float* sums, const float* own, float weight, PixelHalves& pixel, float* out) {
   std::array<Rgb, 2> f;
@@ -184,6 +195,7 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
           candidates.flattened[ch].row(y)[x] +=
               (halves.filtered[0][ch] + halves.filtered[1][ch]) / float(2 * tile.candidates);
       }
+      for (size_t b = begin; b < end && !still[pixel]; ++b) fillFromOthers(tile, i + b - begin, c, b, candidates.value);
       i += end - begin;
     }
   }

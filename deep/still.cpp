@@ -17,26 +17,67 @@ bool quiet(float variance, float colour, float level) {
   return variance <= scale * scale;
 }
 
-// From the guides: the variance of half a frame is twice that of the frame.
-bool quietGuides(std::span<const ComponentGuide> guides, bool halves, int x, int y, float level) {
+// Two means of nothing differ by nothing: what bins of one camera sample say is believed where most of the pixel's
+// other samples agree.
+constexpr float kLeastKnown = 0.5f;
+
+// From the image itself, where nothing else tells: see guide.
+bool quietGuides(std::span<const ComponentGuide> guides, int x, int y, float level) {
   for (const ComponentGuide& guide : guides)
     for (size_t c = 0; c < 3; ++c)
-      if (!quiet((halves ? 0.5f : 1.0f) * guide.variance.value[c].row(y)[x], guide.value[0].value[c].row(y)[x], level))
-        return false;
+      if (!quiet(guide.variance.value[c].row(y)[x], guide.value[0].value[c].row(y)[x], level)) return false;
   return true;
 }
 
-// From the file's own variances, which chance does not make 0 as easily as the difference of two halves.
-bool quietBins(const DenoiseData& data, const std::array<std::span<const float>, 3>& variance,
-               std::span<const ComponentGuide> guides, size_t pixel, int x, int y, float level) {
-  for (size_t c = 0; c < 3; ++c) {
-    float sum = 0, colour = 0;
-    for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
-      sum += data.weight[b] * data.weight[b] * variance[c][b];
-    for (const ComponentGuide& guide : guides) colour += guide.value[0].value[c].row(y)[x];
-    if (!quiet(sum, colour, level)) return false;
+// What the bins of a pixel tell of its noise, and how much of the pixel they are. That the halves see more or less of a
+// bin is no noise of any bin's colour.
+struct PixelNoise {
+  std::array<float, 3> variance{}, colour{};
+  float known = 0, all = 0;
+
+  bool quiet(float level) const {
+    for (size_t c = 0; c < 3; ++c)
+      if (!deep::quiet(variance[c], colour[c], level)) return false;
+    return known >= kLeastKnown * all;
   }
-  return true;
+};
+
+PixelNoise noiseOfHalves(const DenoiseData& data, const DenoiseComponent& component, size_t pixel) {
+  PixelNoise noise;
+  for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
+    const float* v = component.data.data() + 8 * b;
+    noise.all += data.weight[b];
+    if (!(v[3] > 0) || !(v[7] > 0)) continue;
+    noise.known += data.weight[b];
+    const float scale = data.weight[b] * data.weight[b] * v[3] * v[7] / ((v[3] + v[7]) * (v[3] + v[7]));
+    for (size_t c = 0; c < 3; ++c) {
+      const float e = v[c] / v[3] - v[4 + c] / v[7];
+      noise.variance[c] += scale * e * e;
+      noise.colour[c] += 0.5f * (v[c] + v[4 + c]);
+    }
+  }
+  return noise;
+}
+
+// What the file itself says; spans are empty where it has no variances.
+struct FileNoise {
+  std::array<std::span<const float>, 3> variance, colour;
+  std::span<const float> alpha;
+};
+
+// From the file's own variances, which chance does not make 0 as easily as the difference of two halves.
+PixelNoise noiseOfFile(const DenoiseData& data, const FileNoise& file, size_t pixel) {
+  PixelNoise noise;
+  for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
+    const float w = data.weight[b];
+    noise.all += w;
+    if (data.count[b] > 1) noise.known += w;
+    for (size_t c = 0; c < 3 && w > 0; ++c) {
+      noise.variance[c] += w * w * file.variance[c][b];
+      noise.colour[c] += w / file.alpha[b] * file.colour[c][b];
+    }
+  }
+  return noise;
 }
 
 // dst[i] = all of src within radius (windows end at the ends), along one direction with the given step.
@@ -56,14 +97,23 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
                       const DenoiseInputs& inputs, int radius, float level) {
   const size_t width = size_t(data.width), pixels = width * size_t(data.height);
   Activity activity{Buffer<uint8_t>(pixels), Buffer<uint8_t>(pixels)};
-  std::array<std::span<const float>, 3> variance;
-  if (inputs.variance) variance = {image.get("variance.R"), image.get("variance.G"), image.get("variance.B")};
+  FileNoise file;
+  if (inputs.variance) {
+    file.variance = {image.get("variance.R"), image.get("variance.G"), image.get("variance.B")};
+    file.colour = {image.get("R"), image.get("G"), image.get("B")};
+    file.alpha = image.get("A");
+  }
+  const auto isCalm = [&](size_t pixel, int x, int y) {
+    for (size_t c = 0; c < data.components.size() && data.halves; ++c)
+      if (!noiseOfHalves(data, data.components[c], pixel).quiet(level)) return false;
+    if (inputs.variance) return noiseOfFile(data, file, pixel).quiet(level);
+    return data.halves || quietGuides(guides, x, y, level);
+  };
   Buffer<uint8_t> calm(pixels), across(pixels);
   parallelFor(0, data.height, [&](int y) {
     for (int x = 0; x < data.width; ++x) {
       const size_t pixel = size_t(y) * width + size_t(x);
-      calm[pixel] = quietGuides(guides, data.halves, x, y, level) &&
-                    (!inputs.variance || quietBins(data, variance, guides, pixel, x, y, level));
+      calm[pixel] = isCalm(pixel, x, y);
       activity.light[pixel] = 0;
       for (size_t c = 0; c < data.components.size(); ++c)
         for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {

@@ -9,7 +9,8 @@ namespace fathom::deep {
 // What the tiles of a frame need. Decided per pixel and independent of tiles, so that bands of rows decide alike.
 struct Activity {
   // 1: the pixel keeps its colours. It is empty, or the standard deviation of every pixel in the window is below a
-  // thousandth of its colour (or of a twentieth of the frame's mean colour, where that is more), which nobody sees.
+  // thousandth of its colour (or of a twentieth of the frame's mean colour, where that is more), which nobody sees. A
+  // pixel of which most is in bins of a single camera sample is unknown, and never still.
   Buffer<uint8_t> still;
   // Bit c: component c has light in this pixel.
   Buffer<uint8_t> light;
