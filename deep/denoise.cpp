@@ -370,10 +370,10 @@ float meanLevel(const DeepImage& image) {
 int denoiseHalo(const DenoisePlan& plan) {
   // Backwards from a row: the gate's window, the blend's, the error's and the bank's. The farthest bins there need
   // prefiltered features (window, patch, and a row for the gradient), the farthest pixels patches of guides. Those are
-  // blurred (1) and may be estimated over 3 rows; or they are a first pass's result, with all that this needs.
+  // pooled (2) and may be estimated over 3 rows; or they are a first pass's result, with all that this needs.
   const int prefilter = kPrefilterRadius + kPrefilterPatchRadius + 1;
   const auto pass = [&](const JointFilterParams& bank, int guide) {
-    return kBlendRadius + kErrorRadius + bank.radius + std::max(prefilter, bank.patchRadius + 1 + guide);
+    return kBlendRadius + kErrorRadius + bank.radius + std::max(prefilter, bank.patchRadius + 2 + guide);
   };
   const int first = pass(filterBank(plan), 3);
   return kGateRadius + 1 + (hasSecondPass(plan) ? pass(secondBank(), first) : first);

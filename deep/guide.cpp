@@ -11,6 +11,26 @@ namespace {
 // Gaussian of sigma 0.5 over three pixels; further ones weigh less than 4e-4.
 constexpr float kSide = 0.10650697891920f, kMiddle = 1 - 2 * kSide;
 
+// The part of the 5x5 mean that a variance does not fall below, see prefilterVariance.
+constexpr float kPooled = 0.5f;
+
+// Mean over 5x5 pixels of an extended plane, into `out`.
+void mean5x5(const flat::Padded& in, flat::Padded& out, int width, int height) {
+  flat::Padded across(width, height, 2);
+  parallelFor(0, height, [&](int y) {
+    const float* r = in.row(y);
+    float* o = across.row(y);
+    for (int x = 0; x < width; ++x) o[x] = 0.04f * (r[x - 2] + r[x - 1] + r[x] + r[x + 1] + r[x + 2]);
+  });
+  across.extend();
+  parallelFor(0, height, [&](int y) {
+    const float *a = across.row(y - 2), *b = across.row(y - 1), *c = across.row(y), *d = across.row(y + 1),
+                *e = across.row(y + 2);
+    float* o = out.row(y);
+    for (int x = 0; x < width; ++x) o[x] = a[x] + b[x] + c[x] + d[x] + e[x];
+  });
+}
+
 // Where nothing tells the noise: the residual against the mean of the four neighbours, whose expectation for a smooth
 // image is 5/4 of the variance, averaged over 5x5 pixels.
 void estimateVariance(const flat::Padded& value, flat::Padded& variance, int width, int height) {
@@ -23,14 +43,7 @@ void estimateVariance(const flat::Padded& value, flat::Padded& variance, int wid
     }
   });
   residual.extend();
-  parallelFor(0, height, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      float sum = 0;
-      for (int dy = -2; dy <= 2; ++dy)
-        for (int dx = -2; dx <= 2; ++dx) sum += residual.row(y + dy)[x + dx];
-      variance.row(y)[x] = sum / 25;
-    }
-  });
+  mean5x5(residual, variance, width, height);
 }
 
 void flattenBlock(const DenoiseData& data, const float* values, int block, Guide& guide) {
@@ -61,7 +74,7 @@ void flattenVariance(const DenoiseData& data, const Buffer<float>& variance, fla
 
 void prefilterVariance(flat::Padded& variance, int width, int height) {
   variance.extend();
-  flat::Padded across(width, height, 1), blurred(width, height, 1);
+  flat::Padded across(width, height, 1), blurred(width, height, 1), pooled(width, height, 0);
   parallelFor(0, height, [&](int y) {
     const float* in = variance.row(y);
     float* out = across.row(y);
@@ -73,10 +86,11 @@ void prefilterVariance(flat::Padded& variance, int width, int height) {
     float* out = blurred.row(y);
     for (int x = 0; x < width; ++x) out[x] = kMiddle * in[x] + kSide * (above[x] + below[x]);
   });
+  mean5x5(variance, pooled, width, height);
   parallelFor(0, height, [&](int y) {
     float* v = variance.row(y);
-    const float* b = blurred.row(y);
-    for (int x = 0; x < width; ++x) v[x] = std::max(v[x], b[x]);
+    const float *b = blurred.row(y), *p = pooled.row(y);
+    for (int x = 0; x < width; ++x) v[x] = std::max(std::max(v[x], b[x]), kPooled * p[x]);
   });
   variance.extend();
 }
