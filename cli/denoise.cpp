@@ -161,7 +161,8 @@ void writeStats(const std::string& path, const std::vector<DenoiseFrame>& frames
                      {"total", {{"frames", statuses}, {"seconds", total.seconds}, {"counts", total.counts}}},
                      {"peakMemory", peakMemory()}};
   std::ofstream file(path);
-  file << root.dump(2) << "\n";
+  // File names may hold any bytes; JSON holds text.
+  file << root.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   if (!file.flush()) fail("{}: expected a file that can be written", path);
 }
 

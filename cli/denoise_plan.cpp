@@ -14,6 +14,11 @@ namespace fathom::cli {
 
 namespace {
 
+// The program, its libraries, and what the plan itself takes.
+constexpr size_t kProgramBytes = 200'000'000;
+// An image as it is read and in the denoiser's scratch (2), the next one, and the last one as it is written.
+constexpr size_t kImagesInMemory = 4;
+
 // Whether every sample is one camera sample: all have the same part of their pixel, of which most have several. So says
 // the channel convention of files of samples; bins of a render differ in how many samples they hold.
 bool holdsCameraSamples(const deep::DeepImage& image) {
@@ -65,7 +70,7 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   wantInputs(plan.denoise, source);
   const Box window = source.part().dataWindow;
   const bool statistics = hasStatistics(source.part());
-  if (wanted && statistics && source.decodedBytes(window.y0, window.y1) <= options.memory / kFramesInMemory) {
+  if (wanted && statistics && source.decodedBytes(window.y0, window.y1) <= decodedLimit(options.memory)) {
     plan.firstImage = source.read(plan.notes);
     plan.denoise.level = deep::meanLevel(*plan.firstImage);
     return plan;
@@ -87,14 +92,23 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
 
 }  // namespace
 
+size_t decodedLimit(size_t memory) {
+  return (memory > 2 * kProgramBytes ? memory - kProgramBytes : memory / 2) / kImagesInMemory;
+}
+
+size_t memoryFor(size_t decoded) {
+  const size_t images = decoded * kImagesInMemory;
+  return images + std::min(images, kProgramBytes);
+}
+
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
                           const deep::DenoiseParams& params, const std::string& wanted) {
   std::exception_ptr first;
   for (const FrameInputs& inputs : candidates) {
     try {
       return planFrom(inputs, options, params, inputs.main == wanted);
-    } catch (const Error&) {
-      if (!first) first = std::current_exception();
+    } catch (const Error& e) {
+      if (!first) first = std::make_exception_ptr(Error(namingFile(e.what(), inputs.files())));
     }
   }
   if (first) std::rethrow_exception(first);

@@ -12,9 +12,10 @@
 
 namespace fathom::cli {
 
-// How often an image that is denoised is in memory: as it is read and in the denoiser's scratch (4), the next, and the
-// last.
-constexpr size_t kFramesInMemory = 6;
+// How many bytes an image that is denoised may take when it is decoded, so that the run stays within `memory`; and
+// back.
+size_t decodedLimit(size_t memory);
+size_t memoryFor(size_t decoded);
 
 struct SequencePlan {
   deep::DenoisePlan denoise;

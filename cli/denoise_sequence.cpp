@@ -27,21 +27,18 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// What went wrong, in one line that names the frame's input where it does not begin with one of its files.
+// What went wrong, in one line that begins with a file.
 std::string describeError(const DenoiseFrame& frame) {
+  std::vector<std::string> files = frame.inputs.files();
+  for (const std::string& file : frame.outputs.files()) files.push_back(file);
   try {
     throw;
   } catch (const Error& e) {
-    const std::string text = e.what();
-    std::vector<std::string> files = frame.inputs.files();
-    for (const std::string& file : frame.outputs.files()) files.push_back(file);
-    const bool named =
-        std::any_of(files.begin(), files.end(), [&](const std::string& file) { return text.starts_with(file); });
-    return named ? text : fmt::format("{}: {}", frame.inputs.main, text);
+    return namingFile(e.what(), files);
   } catch (const std::bad_alloc&) {
-    return fmt::format("{}: out of memory", frame.inputs.main);
+    return namingFile("out of memory", files);
   } catch (const std::exception& e) {
-    return fmt::format("{}: {}", frame.inputs.main, oneLine(e.what()));
+    return namingFile(oneLine(e.what()), files);
   }
 }
 
@@ -61,27 +58,29 @@ struct Chunk {
   std::set<std::string> notes;
 };
 
-// The bands whose rows, with `halo` more on both sides, take at most `budget` bytes.
+// As few bands of as many rows each as that they, with `halo` more rows on both sides, take at most `budget` bytes.
 std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
   const Box& window = source.part().dataWindow;
   if (source.decodedBytes(window.y0, window.y1) <= budget) return {{window.y0, window.y1}};
   std::vector<size_t> upTo = {0};
   for (int y = window.y0; y < window.y1; ++y) upTo.push_back(upTo.back() + source.decodedBytes(y, y + 1));
-  const auto bytes = [&](int y0, int y1) {
-    return upTo[size_t(std::min(y1 + halo, window.y1) - window.y0)] -
-           upTo[size_t(std::max(y0 - halo, window.y0) - window.y0)];
+  const auto bytes = [&](const Band& band) {
+    return upTo[size_t(std::min(band.y1 + halo, window.y1) - window.y0)] -
+           upTo[size_t(std::max(band.y0 - halo, window.y0) - window.y0)];
   };
-  std::vector<Band> bands;
-  for (int y0 = window.y0; y0 < window.y1;) {
-    int y1 = y0 + 1;
-    if (bytes(y0, y1) > budget)
-      fail("{}: expected at least {} MB of memory for rows {} to {}, found a limit of {} MB", source.path(),
-           bytes(y0, y1) * kFramesInMemory / 1'000'000 + 1, y0 - halo, y1 + halo, budget * kFramesInMemory / 1'000'000);
-    while (y1 < window.y1 && bytes(y0, y1 + 1) <= budget) ++y1;
-    bands.push_back({y0, y1});
-    y0 = y1;
+  size_t most = 0;
+  for (int height = (window.height() + 1) / 2;; height = (height + 1) / 2) {
+    std::vector<Band> bands;
+    most = 0;
+    for (int y = window.y0; y < window.y1; y += height) {
+      bands.push_back({y, std::min(y + height, window.y1)});
+      most = std::max(most, bytes(bands.back()));
+    }
+    if (most <= budget) return bands;
+    if (height == 1) break;
   }
-  return bands;
+  fail("{}: expected at least {} MB of memory, for a row with the {} around it that decide it; found a limit of {} MB",
+       source.path(), memoryFor(most) / 1'000'000 + 1, 2 * halo, memoryFor(budget) / 1'000'000);
 }
 
 // The first stage: checks what is there already, and reads.
@@ -130,7 +129,7 @@ class ChunkReader {
     if (isDone(frame.outputs, madeBy)) return false;
 
     source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
-    bands_ = cutBands(*source_, halo_, job_.memory / kFramesInMemory);
+    bands_ = cutBands(*source_, halo_, decodedLimit(job_.memory));
     origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
                                                         source_->part().dataWindow, source_->flatAttributes(), madeBy});
     return true;

@@ -145,6 +145,12 @@ class MappedFile {
   std::map<std::string, std::string> attributes_;
 };
 
+std::string namingFile(const std::string& text, const std::vector<std::string>& files) {
+  const bool named =
+      std::any_of(files.begin(), files.end(), [&](const std::string& file) { return text.starts_with(file); });
+  return named || files.empty() ? text : fmt::format("{}: {}", files.front(), text);
+}
+
 FrameSource::FrameSource(const FrameInputs& inputs, const SourceOptions& options) {
   const auto open = [&](const std::string& path, const std::string& part) {
     return path.empty() ? nullptr : std::make_unique<MappedFile>(path, part, options);

@@ -24,8 +24,11 @@ struct FrameInputs {
   std::array<std::string, 2> halves;
   std::string alpha;
 
-  std::vector<std::string> files() const;
+  std::vector<std::string> files() const;  // the main one first
 };
+
+// An error's text as it is where it begins with one of the files, else with the first of them put before it.
+std::string namingFile(const std::string& text, const std::vector<std::string>& files);
 
 struct SourceOptions {
   std::string part;  // of the main file: number or name; empty: the first deep part, or else the first
