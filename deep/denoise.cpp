@@ -43,6 +43,7 @@ JointFilterParams filterBank(const DenoisePlan& plan) {
   params.kColour = {0.45f, 0.7f};
   params.kFeature = {0.7f, 2.0f, 0.7f};
   params.crossed = plan.inputs.halves;
+  params.epsilon *= 4 * plan.level * plan.level;
   if (plan.params.quality == Quality::Fast) {
     params.patchRadius = 1;
     params.candidates = 2;
@@ -60,8 +61,9 @@ bool hasSecondPass(const DenoisePlan& plan) {
   return plan.params.quality == Quality::Best && plan.inputs.halves;
 }
 
-JointFilterParams secondBank() {
+JointFilterParams secondBank(const DenoisePlan& plan) {
   JointFilterParams params;
+  params.epsilon *= 4 * plan.level * plan.level;
   params.radius = 6;
   params.patchRadius = 2;
   params.kColour = {1.0f, 2.0f};
@@ -310,7 +312,7 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   clock.lap("prefilter");
   progress.at(0.1);
 
-  const JointFilterParams bank = filterBank(plan), second = secondBank();
+  const JointFilterParams bank = filterBank(plan), second = secondBank(plan);
   const bool twice = hasSecondPass(plan);
   std::vector<ComponentGuide> guides;
   for (const DenoiseComponent& component : data.components)
@@ -376,7 +378,7 @@ int denoiseHalo(const DenoisePlan& plan) {
     return kBlendRadius + kErrorRadius + bank.radius + std::max(prefilter, bank.patchRadius + 2 + guide);
   };
   const int first = pass(filterBank(plan), 3);
-  return kGateRadius + 1 + (hasSecondPass(plan) ? pass(secondBank(), first) : first);
+  return kGateRadius + 1 + (hasSecondPass(plan) ? pass(secondBank(plan), first) : first);
 }
 
 }  // namespace fathom::deep

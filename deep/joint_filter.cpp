@@ -43,10 +43,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Equation 3 without its maximum, per pixel of the tile and its patch border: mean over channels of the normalised
 // squared distance between p and q = p + (dx, dy), for both blocks.
 template <bool kSameVariance>
-void PixelDistances(const FilterComponent& component, const Box& tile, int patch, int dx, int dy, FilterScratch& s) {
+void PixelDistances(const FilterComponent& component, const Box& tile, const JointFilterParams& params, int dx, int dy,
+                    FilterScratch& s) {
+  const int patch = params.patchRadius;
   const hn::ScalableTag<float> d;
   const size_t N = hn::Lanes(d);
-  const auto epsilon = hn::Set(d, 1e-10f);
+  const auto epsilon = hn::Set(d, params.epsilon);
   const auto third = hn::Set(d, 1.0f / 3);
   for (int y = tile.y0 - patch; y < tile.y1 + patch; ++y) {
     const size_t out = size_t(y - tile.y0 + patch) * FilterScratch::kStride;
@@ -319,9 +321,9 @@ void FilterOneTile(const JointFilterInput& in, const JointFilterParams& params, 
         const FilterComponent& component = in.components[size_t(which[size_t(c)])];
         for (int dx = -params.radius; dx <= params.radius; ++dx) {
           if (component.variance[0] == component.variance[1])
-            PixelDistances<true>(component, tile, patch, dx, dy, s);
+            PixelDistances<true>(component, tile, params, dx, dy, s);
           else
-            PixelDistances<false>(component, tile, patch, dx, dy, s);
+            PixelDistances<false>(component, tile, params, dx, dy, s);
           SumAcross(tile.height() + 2 * patch, patch, s);
           ColourWeights(params, tile.height(), s,
                         s.colourWeights.data() +

@@ -34,6 +34,7 @@ struct JointFilterParams {
   std::array<float, 2> kColour{0.45f, 0.6f};
   std::array<float, kMaxCandidates> kFeature{0.7f, 2.0f, 2.0f};
   float tau = 0.001f;
+  float epsilon = 1e-10f;  // equation 3, added to variances, for colours whose mean is about 0.5
   bool crossed = true;
 };
 

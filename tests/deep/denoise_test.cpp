@@ -390,6 +390,29 @@ TEST(Denoise, AMirroredFrameGivesTheMirroredAnswer) {
   }
 }
 
+TEST(Denoise, FollowsTheExposure) {
+  const DeepImage image = renderFrame().noisy;
+  const DenoisePlan plan = planFor(image);
+  const DeepImage expected = denoise(image.copy(), plan);
+  for (const float scale : {0x1p10f, 0x1p-10f}) {
+    DeepImage scaled = image.copy();
+    for (Channel& channel : scaled.channels) {
+      const std::string& name = channel.name;
+      const bool variance = name == "variance.R" || name == "variance.G" || name == "variance.B";
+      const bool colour = name.find("diffuse.") != std::string::npos || name.find("specular.") != std::string::npos ||
+                          name == "R" || name == "G" || name == "B" || (name.starts_with("half") && name.size() == 7);
+      if (variance || colour)
+        for (float& v : channel.values) v *= variance ? scale * scale : scale;
+    }
+    DenoisePlan scaledPlan = plan;
+    scaledPlan.level *= scale;
+    DeepImage out = denoise(std::move(scaled), scaledPlan);
+    for (const std::string& name : kColours)
+      for (float& v : out.get(name)) v /= scale;
+    EXPECT_LT(farthest(out, expected), 1e-3) << scale;
+  }
+}
+
 TEST(Denoise, DegradesWithWhatIsMissing) {
   RenderedFrame frame = renderFrame({.width = 64, .height = 48});
   const double flat = flatError(frame.noisy, frame.truth), bins = binError(frame.noisy, frame.truth);
