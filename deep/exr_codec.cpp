@@ -17,24 +17,37 @@ namespace {
 
 constexpr uint8_t kZero = 128;  // a difference of 0
 
-// From differences to values.
+// From differences to values: a running sum, eight bytes of a word at a time. The word's even and odd bytes go into
+// 16-bit lanes; the product has in each lane the sum of the lanes up to it, and nothing carries over from lane to lane.
 void sumBytes(std::span<uint8_t> bytes) {
-  uint8_t sum = kZero;
-  for (uint8_t& b : bytes) {
-    sum = uint8_t(sum + b - kZero);
-    b = sum;
+  constexpr uint64_t kLanes = 0x0001000100010001, kLow = 0xff * kLanes, kZeros = 0x8080808080808080;
+  uint64_t sum = kZero;
+  size_t i = 0;
+  for (; i + 8 <= bytes.size(); i += 8) {
+    uint64_t word;
+    std::memcpy(&word, bytes.data() + i, 8);
+    word ^= kZeros;  // minus kZero in each byte, modulo 256
+    const uint64_t odd = (word >> 8) & kLow;
+    const uint64_t pairs = ((word & kLow) + odd) * kLanes;
+    const uint64_t sums = pairs + (sum & 0xff) * kLanes;
+    word = ((sums - odd) & kLow) | (sums & kLow) << 8;
+    std::memcpy(bytes.data() + i, &word, 8);
+    sum += pairs >> 48;
   }
+  for (; i < bytes.size(); ++i) bytes[i] = uint8_t(sum += bytes[i] - kZero);
 }
 
-// Even places to the first half, odd ones to the second, and then differences.
+// Even places to the first half, odd ones to the second, each as the difference to the byte before it there. The
+// number of bytes is even and not 0.
 void splitBytes(std::span<const uint8_t> bytes, uint8_t* to) {
-  const size_t half = (bytes.size() + 1) / 2;
-  for (size_t i = 0; i < bytes.size() / 2; ++i) {
-    to[i] = bytes[2 * i];
-    to[half + i] = bytes[2 * i + 1];
+  const size_t half = bytes.size() / 2;
+  const uint8_t* from = bytes.data();
+  to[0] = from[0];
+  to[half] = uint8_t(from[1] - from[bytes.size() - 2] + kZero);
+  for (size_t i = 1; i < half; ++i) {
+    to[i] = uint8_t(from[2 * i] - from[2 * i - 2] + kZero);
+    to[half + i] = uint8_t(from[2 * i + 1] - from[2 * i - 1] + kZero);
   }
-  if (bytes.size() % 2) to[half - 1] = bytes.back();
-  for (size_t i = bytes.size(); i-- > 1;) to[i] = uint8_t(to[i] - to[i - 1] + kZero);
 }
 
 // A run is a count n >= 0 and a byte that stands n + 1 times, or a count n < 0 and -n bytes as they are.
@@ -78,7 +91,8 @@ void packRuns(std::span<const uint8_t> bytes, std::vector<uint8_t>& to) {
   }
 }
 
-constexpr int kDeflateLevel = 4;
+// Level 4 takes 1.4 times as long and saves 1.5 % of the file.
+constexpr int kDeflateLevel = 1;
 
 }  // namespace
 
