@@ -24,8 +24,8 @@ inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
 // What a filter bank made of one component.
 struct Candidates {
   std::vector<Buffer<float>> value;  // [candidate], per bin 3
-  std::vector<flat::Padded> error;   // [candidate], per pixel: estimated squared error of the flattened value, R + G +
-                                     // B; unbiased, so negative at times
+  // [candidate], per pixel: estimated squared error of the flattened value, R + G + B; unbiased, so negative at times.
+  std::vector<flat::Padded> error;
   std::vector<flat::Padded> flattened;       // [channel], per pixel: the mean of the candidates
   std::vector<std::array<Guide, 2>> halves;  // [candidate][half]: flattened; only where a pilot is wanted
 
@@ -39,8 +39,8 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
 
 struct Blend {
   Buffer<float> value;  // per bin 3
-  ComponentGuide
-      pilot;  // where wanted: the flattened blend of each half and its two-buffer variance, for a second pass
+  // Where wanted, for a second pass: the flattened blend of each half and its two-buffer variance.
+  ComponentGuide pilot;
 };
 
 // Blends the candidates and takes their storage. `level`: the mean colour of the frame; `pad`: the border of the pilot.

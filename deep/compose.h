@@ -1,0 +1,31 @@
+// From filtered components back to the colours of the bins.
+//
+// Source: Vicini et al., section 5.2: the albedo multiplied back, the components added.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "deep/denoise_data.h"
+#include "deep/gate.h"
+#include "deep/guide.h"
+
+namespace fathom::deep {
+
+// The variance of one camera sample as the flattened guides tell it, per component and channel a plane over the pixels;
+// nothing where halves or the file tell it by bin.
+std::vector<std::array<Buffer<float>, 3>> pixelVariance(const DenoiseData& data, std::span<const ComponentGuide> guides,
+                                                        const DenoiseInputs& inputs);
+
+// Multiplies the albedo back into `filtered` (per component 3 values per bin) and fills what the gate needs of each
+// bin, with the noisy colours from `image`. `ofPixels`: pixelVariance's.
+Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const DenoiseInputs& inputs,
+                        const Buffer<uint8_t>& still, std::span<const std::array<Buffer<float>, 3>> ofPixels,
+                        std::span<Buffer<float>> filtered);
+
+// Writes f + gate * (y - f), premultiplied, by component and whole. Still pixels stay as they are, and bins without a
+// weight, which nothing could fill: what is not finite there becomes 0.
+void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_t>& still,
+                  std::span<const Buffer<float>> filtered, const Buffer<float>& gate);
+
+}  // namespace fathom::deep

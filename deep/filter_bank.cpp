@@ -1,0 +1,138 @@
+#include "deep/filter_bank.h"
+
+#include <mutex>
+
+#include "deep/selection.h"
+
+namespace fathom::deep {
+
+namespace {
+
+// Sums what the tiles of one pass did, from several threads, and tells how far they are.
+class TileCount {
+ public:
+  TileCount(const DenoiseData& data, const Progress& progress, double from, double to, FilterCounts& counts)
+      : data_(data), progress_(progress), from_(from), to_(to), counts_(counts) {}
+
+  void add(const FilterTile& tile) {
+    const uint64_t bins = binsOf(tile.box);
+    const size_t components = data_.components.size();
+    const std::lock_guard lock(mutex_);
+    ++counts_.tiles;
+    if (tile.active == 0)
+      ++counts_.tilesStill;
+    else
+      counts_.tilesDark += components - size_t(tile.components);
+    const size_t filtered = tile.active == 0 ? 0 : size_t(tile.components);
+    counts_.binsFiltered += bins * filtered;
+    counts_.binsSkipped += bins * (components - filtered);
+    done_ += double(tile.box.area()) / (double(data_.width) * double(data_.height));
+    progress_.at(from_ + (to_ - from_) * std::min(1.0, done_));
+  }
+
+ private:
+  uint64_t binsOf(const Box& box) const {
+    uint64_t bins = 0;
+    for (int y = box.y0; y < box.y1; ++y) {
+      const uint64_t* row = data_.offsets + size_t(y) * size_t(data_.width);
+      bins += row[box.x1] - row[box.x0];
+    }
+    return bins;
+  }
+
+  const DenoiseData& data_;
+  const Progress& progress_;
+  double from_, to_, done_ = 0;
+  std::mutex mutex_;
+  FilterCounts& counts_;
+};
+
+// The features of a frame as the joint filter takes them; owns their gradients.
+struct FeatureInput {
+  std::vector<Buffer<float>> gradients;
+  std::vector<FeatureChannel> channels;
+
+  explicit FeatureInput(const DenoiseData& data) {
+    for (const Feature* feature : {&data.albedo, &data.normal, &data.depth}) {
+      std::vector<Buffer<float>> gradient = squaredGradients(data, *feature);
+      for (size_t c = 0; c < gradient.size(); ++c) {
+        channels.push_back({feature->value[c].data(), feature->variance[c].data(), gradient[c].data()});
+        gradients.push_back(std::move(gradient[c]));
+      }
+    }
+  }
+};
+
+// One pass: the bank's candidates for every component, blended; with pilots where pilotPad > 0.
+std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& features,
+                              std::span<const ComponentGuide> guides, const Activity& activity,
+                              const JointFilterParams& pass, float level, int pilotPad, TileCount& count) {
+  JointFilterInput input{data.width, data.height, data.rowPhase, data.offsets, features.channels, {}};
+  std::vector<Candidates> candidates;
+  for (size_t c = 0; c < data.components.size(); ++c) {
+    const ComponentGuide& guide = guides[c];
+    input.components.push_back(
+        {data.components[c].data.data(), {&guide.value[0], &guide.value[1]}, {&guide.variance, &guide.variance}});
+    candidates.emplace_back(data, pass.candidates, pilotPad > 0);
+  }
+  const auto active = [&](const Box& tile) { return activeComponents(data, activity, tile, pass.radius); };
+  const auto consume = [&](const FilterTile& tile) {
+    int c = 0;
+    for (size_t i = 0; i < data.components.size(); ++i)
+      if (tile.active >> i & 1)
+        addCandidates(data, data.components[i], guides[i].variance, tile, c++, activity.still, candidates[i]);
+    count.add(tile);
+  };
+  jointFilter(input, pass, active, consume);
+  std::vector<Blend> result;
+  for (Candidates& candidate : candidates)
+    result.push_back(blendCandidates(data, std::move(candidate), level, pilotPad));
+  return result;
+}
+
+}  // namespace
+
+std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan) {
+  JointFilterParams first;
+  first.epsilon *= 4 * plan.level * plan.level;
+  first.kColour = {0.45f, 0.7f};
+  first.kFeature = {0.7f, 2.0f, 0.7f};
+  first.crossed = plan.inputs.halves;
+  if (plan.params.quality == Quality::Fast) {
+    first.patchRadius = 1;
+    first.candidates = 2;
+    first.colourCandidates = 1;
+    first.kColour = {0.6f, 0.6f};
+    first.kFeature = {1.0f, 0.7f, 0.7f};
+  }
+  if (plan.params.quality != Quality::Best || !plan.inputs.halves) return {first};
+  JointFilterParams second = first;
+  second.radius = 6;
+  second.patchRadius = 2;
+  second.kColour = {1.0f, 2.0f};
+  second.tau = 0.0007f;
+  return {first, second};
+}
+
+std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
+                                         const Activity& activity, std::span<const JointFilterParams> passes,
+                                         float level, const Progress& progress, FilterCounts& counts) {
+  const FeatureInput features(data);
+  std::vector<Blend> blends;
+  double cost = 0, done = 0;  // in candidate pixels of the windows
+  const auto costOf = [](const JointFilterParams& pass) { return double(2 * pass.radius + 1) * (2 * pass.radius + 1); };
+  for (const JointFilterParams& pass : passes) cost += costOf(pass);
+  for (size_t i = 0; i < passes.size(); ++i) {
+    const double from = done / cost;
+    done += costOf(passes[i]);
+    TileCount count(data, progress, from, done / cost, counts);
+    const int pilotPad = i + 1 < passes.size() ? guideBorder(passes[i + 1]) : 0;
+    blends = filterOnce(data, features, guides, activity, passes[i], level, pilotPad, count);
+    for (size_t c = 0; c < guides.size(); ++c) guides[c] = std::move(blends[c].pilot);
+  }
+  std::vector<Buffer<float>> result;
+  for (Blend& blend : blends) result.push_back(std::move(blend.value));
+  return result;
+}
+
+}  // namespace fathom::deep
