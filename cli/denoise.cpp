@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -99,7 +102,8 @@ bool sameFile(const std::string& a, const std::string& b) {
   return a == b || std::filesystem::equivalent(a, b, none);
 }
 
-void checkNothingIsLost(const DenoiseFrame& frame) {
+// Before hours of work: that no input is overwritten, and that there is a place for the outputs.
+void checkOutputs(const DenoiseFrame& frame) {
   const std::vector<std::string> outputs = frame.outputs.files();
   for (size_t i = 0; i < outputs.size(); ++i) {
     for (const std::string& input : frame.inputs.files())
@@ -107,6 +111,9 @@ void checkNothingIsLost(const DenoiseFrame& frame) {
     for (size_t k = 0; k < i; ++k)
       if (sameFile(outputs[k], outputs[i]))
         usage("-o", fmt::format("expected different files, found {} twice", outputs[i]));
+    const std::string folder = std::filesystem::path(outputs[i]).parent_path().string();
+    if (access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+      fail("{}: cannot write there: {}", outputs[i], std::strerror(errno));
   }
 }
 
@@ -128,6 +135,12 @@ deep::DenoiseParams paramsOf(const DenoiseCommand& command) {
                           : command.quality == "best" ? Quality::Best
                                                       : Quality::Balanced;
   return {quality, !command.noGate, command.keep};
+}
+
+// The main file of the first frame if it is not there yet: the plan may read it for the denoiser, too.
+std::string firstToDo(const DenoiseJob& job) {
+  const DenoiseFrame& frame = job.frames.front();
+  return std::filesystem::exists(frame.outputs.image) ? "" : frame.inputs.main;
 }
 
 int64_t peakMemory() {
@@ -180,10 +193,12 @@ void runDenoise(const DenoiseCommand& command) {
   const int threads = command.threads > 0 ? command.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(threads));
 
+  if (!command.frames.empty() && !parsePattern(command.input).numbered())
+    usage("--frames", fmt::format("expected a sequence such as name.####.exr, found {}", command.input));
   const Sequence sequence = findSequence(command.input, command.frames);
   DenoiseJob job;
   job.frames = framesOf(command, sequence);
-  for (const DenoiseFrame& frame : job.frames) checkNothingIsLost(frame);
+  for (const DenoiseFrame& frame : job.frames) checkOutputs(frame);
   job.source.part = command.part;
   if (!command.map.empty()) job.source.map = readChannelMap(command.map);
   job.source.memory = job.memory = command.memory;
@@ -196,7 +211,7 @@ void runDenoise(const DenoiseCommand& command) {
     for (const int frame : framesOnDisk(sequence.pattern)) candidates.push_back(inputsAt(command, frame));
   else
     candidates.push_back(job.frames.front().inputs);
-  job.plan = planSequence(candidates, job.source, paramsOf(command), job.frames.front().inputs.main);
+  job.plan = planSequence(candidates, job.source, paramsOf(command), firstToDo(job));
   if (!job.plan.deep && !command.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", command.input);
   if (command.components && !job.plan.denoise.inputs.components)
@@ -225,8 +240,25 @@ void addDenoise(CLI::App& app) {
   const auto option = [&](const char* name, auto& value, const char* type, const std::string& text) {
     return sub->add_option(name, value, text)->type_name(type);
   };
-  option("IN", command->input, "", "EXR file, or a sequence: name.####.exr, name.%04d.exr")->required();
-  option("-o,--output", command->output, "OUT", "Where the result goes, numbered as IN is")->required();
+  // What is not understood is a usage error.
+  const auto understood = [](auto parse) {
+    return CLI::Validator(
+        [parse](const std::string& text) {
+          try {
+            parse(text);
+          } catch (const Error& e) {
+            return std::string(e.what());
+          }
+          return std::string();
+        },
+        "");
+  };
+  option("IN", command->input, "", "EXR file, or a sequence: name.####.exr, name.%04d.exr")
+      ->required()
+      ->check(understood(parsePattern));
+  option("-o,--output", command->output, "OUT", "Where the result goes, numbered as IN is")
+      ->required()
+      ->check(understood(parsePattern));
   option("--flat", command->flattened, "OUT2", "Also write the flattened result");
   sub->add_flag("--components", command->components,
                 "Also write diffuse and specular each to a file beside OUT (which holds both as channels)");
@@ -235,7 +267,8 @@ void addDenoise(CLI::App& app) {
       ->default_str(command->quality);
   sub->add_flag("--no-gate", command->noGate, "The published filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
-  option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)");
+  option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")
+      ->check(understood(parseFrames));
   option("--frames-missing", command->missing, "skip|fail", "Whether a missing frame is a failure; the others are done")
       ->check(CLI::IsMember({"skip", "fail"}).description(""))
       ->default_str(command->missing);
