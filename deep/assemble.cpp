@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,21 +16,11 @@ namespace fathom::deep {
 
 namespace {
 
-constexpr uint32_t kNowhere = std::numeric_limits<uint32_t>::max();
-
 Buffer<float> depths(const DeepImage& image) {
   const std::span<const float> z = image.get("Z"), back = image.tryGet("ZBack");
   Buffer<float> result(z.size());
   for (size_t i = 0; i < z.size(); ++i) result[i] = binDepth(z[i], back.empty() ? z[i] : back[i]);
   return result;
-}
-
-// The index of the depth that is nearest to `z`; of equal ones the first. `bins` ascends and is not empty.
-size_t nearest(std::span<const float> bins, float z) {
-  const size_t above = size_t(std::lower_bound(bins.begin(), bins.end(), z) - bins.begin());
-  if (above == 0) return 0;
-  if (above == bins.size()) return above - 1;
-  return double(z) - double(bins[above - 1]) <= double(bins[above]) - double(z) ? above - 1 : above;
 }
 
 // Which samples of one image come to which bins of another, and with what weight.
@@ -40,14 +29,13 @@ class Pairing {
   Pairing(const DeepImage& to, const DeepImage& from)
       : to_(to), from_(from), weight_(effectiveAlpha(from)), bin_(from.samples()), nearestSample_(to.samples()) {
     const Buffer<float> toDepth = depths(to), fromDepth = depths(from);
-    nearestSample_.fill(kNowhere);
     forEachPixel([&](size_t toFirst, size_t toCount, size_t fromFirst, size_t fromCount) {
       const std::span<const float> bins{toDepth.data() + toFirst, toCount};
       const std::span<const float> samples{fromDepth.data() + fromFirst, fromCount};
       if (!bins.empty())
-        for (size_t i = 0; i < fromCount; ++i) bin_[fromFirst + i] = uint32_t(nearest(bins, samples[i]));
+        for (size_t i = 0; i < fromCount; ++i) bin_[fromFirst + i] = uint32_t(nearestBin(bins, samples[i]));
       if (!samples.empty())
-        for (size_t b = 0; b < toCount; ++b) nearestSample_[toFirst + b] = uint32_t(nearest(samples, bins[b]));
+        for (size_t b = 0; b < toCount; ++b) nearestSample_[toFirst + b] = uint32_t(nearestBin(samples, bins[b]));
     });
   }
 
@@ -63,7 +51,7 @@ class Pairing {
     });
   }
 
-  // The sum over the samples that come to each bin of weight^power * value(sample).
+  // The sum over the samples that come to each bin of value(sample).
   template <class Value>
   Buffer<double> sum(const Value& value) const {
     Buffer<double> result(to_.samples(), 0);

@@ -44,6 +44,14 @@ void appendBins(std::span<const float> depths, float ppuScale, const ClusterPara
 
 }  // namespace
 
+size_t nearestBin(std::span<const float> bins, float depth) {
+  const size_t behind = size_t(std::lower_bound(bins.begin(), bins.end(), depth) - bins.begin());
+  if (behind == 0) return 0;
+  const size_t before = behind - 1;
+  if (behind == bins.size()) return before;
+  return double(depth) - double(bins[before]) <= double(bins[behind]) - double(depth) ? before : behind;
+}
+
 BinLayout findBins(const DeepImage& samples, float ppuScale, const ClusterParams& params) {
   const std::span<const float> z = samples.get("Z"), zBack = samples.tryGet("ZBack");
   BinLayout layout{samples.dataWindow, Buffer<uint64_t>(samples.pixels() + 1, 0), {}, {}};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cfloat>
 #include <optional>
+#include <span>
 
 #include "deep/image.h"
 #include "deep/volume.h"
@@ -15,6 +16,9 @@ namespace fathom::deep {
 inline float binDepth(float z, float zBack) {
   return std::clamp(float(usableRange(z, zBack).middle()), -FLT_MAX, FLT_MAX);
 }
+
+// The number of the bin that lies nearest to `depth`; of two as near the front one. `bins` ascends and is not empty.
+size_t nearestBin(std::span<const float> bins, float depth);
 
 struct BinLayout {
   Box window;

@@ -32,15 +32,6 @@ void sortByDepth(const SampleGeometry& samples, Pixel& pixel) {
     std::stable_sort(pixel.order.begin(), pixel.order.end(), front);
 }
 
-// The nearest; of two as near the front one.
-size_t nearestBin(std::span<const float> bins, float z) {
-  const size_t behind = size_t(std::lower_bound(bins.begin(), bins.end(), z) - bins.begin());
-  if (behind == 0) return 0;
-  const size_t before = behind - 1;
-  if (behind == bins.size()) return before;
-  return double(z) - double(bins[before]) <= double(bins[behind]) - double(z) ? before : behind;
-}
-
 void assign(const SampleGeometry& samples, const Pixel& pixel, ClusterPlan& plan) {
   for (size_t i = 0; i < pixel.count; ++i) {
     if (pixel.bins.empty()) {
