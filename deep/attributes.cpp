@@ -20,12 +20,19 @@ const Attribute* find(const Imf::Header& header, std::string_view name) {
 // Header::insert refuses to change the type of an attribute that is there.
 template <class Attribute>
 void replace(Imf::Header& header, std::string_view name, const Attribute& attribute) {
-  const std::string key(name);
-  header.erase(key);
-  header.insert(key, attribute);
+  eraseAttribute(header, name);
+  header.insert(std::string(name), attribute);
 }
 
 }  // namespace
+
+void eraseAttribute(Imf::Header& header, std::string_view name) {
+  if (header.find(std::string(name)) == header.end()) return;
+  Imf::Header others;
+  for (auto it = header.begin(); it != header.end(); ++it)
+    if (it.name() != name) others.insert(it.name(), it.attribute());
+  header = others;
+}
 
 Attributes::Attributes() : header_(std::make_unique<Imf::Header>()) {}
 Attributes::Attributes(const Imf::Header& header) : header_(std::make_unique<Imf::Header>(header)) {}
@@ -77,7 +84,7 @@ void Attributes::set(std::string_view name, const std::array<float, 16>& value) 
   replace(*header_, name, Imf::M44fAttribute(matrix));
 }
 void Attributes::erase(std::string_view name) {
-  header_->erase(std::string(name));
+  eraseAttribute(*header_, name);
 }
 
 }  // namespace fathom::deep

@@ -11,6 +11,9 @@
 
 namespace fathom::deep {
 
+// Removes an attribute where there is one. (Imf::Header::erase of OpenEXR 3.1 takes it out without freeing it.)
+void eraseAttribute(Imf::Header& header, std::string_view name);
+
 class Attributes {
  public:
   Attributes();

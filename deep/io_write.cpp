@@ -77,11 +77,11 @@ Imf::Header makeHeader(const std::string& path, const DeepImage& layout, const B
   header.displayWindow() = toWindow(layout.displayWindow);
   header.compression() = compressionOf(path, options.compression);
   header.lineOrder() = Imf::INCREASING_Y;
-  header.erase("tiles");
+  eraseAttribute(header, "tiles");
   const bool tiled = options.tileWidth > 0 && options.tileHeight > 0;
   if (tiled) header.setTileDescription(Imf::TileDescription(unsigned(options.tileWidth), unsigned(options.tileHeight)));
   header.setType(tiled ? Imf::DEEPTILE : Imf::DEEPSCANLINE);
-  header.erase("version");
+  eraseAttribute(header, "version");
   header.setVersion(1);
   header.channels() = Imf::ChannelList();
   for (const Channel& c : layout.channels) {
@@ -182,7 +182,7 @@ struct Writer::Impl {
   }
 
   void setMost(int samples) {
-    parts[own].header.erase("maxSamplesPerPixel");
+    eraseAttribute(parts[own].header, "maxSamplesPerPixel");
     parts[own].header.insert("maxSamplesPerPixel", Imf::IntAttribute(samples));
   }
 
