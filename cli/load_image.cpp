@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "deep/flatten.h"
 #include "flat/exr_size.h"
 #include "flat/io.h"
 
@@ -22,12 +21,6 @@ AnyImage loadImage(const std::string& path, const deep::ChannelFilter& needed) {
     return name == "A" || name == "Z" || name == "ZBack" || needed(name);
   };
   return deep::read(path, {.part = {}, .channels = filter});
-}
-
-flat::Image loadFlat(const std::string& path, const deep::ChannelFilter& needed) {
-  AnyImage image = loadImage(path, needed);
-  if (auto* flat = std::get_if<flat::Image>(&image)) return std::move(*flat);
-  return deep::flatten(std::get<deep::DeepImage>(image));
 }
 
 }  // namespace fathom::cli

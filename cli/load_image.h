@@ -16,7 +16,4 @@ using AnyImage = std::variant<deep::DeepImage, flat::Image>;
 // A, Z and ZBack, are unpacked.
 AnyImage loadImage(const std::string& path, const deep::ChannelFilter& needed);
 
-// The same, flattened if it is deep.
-flat::Image loadFlat(const std::string& path, const deep::ChannelFilter& needed);
-
 }  // namespace fathom::cli
