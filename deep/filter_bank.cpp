@@ -90,6 +90,16 @@ std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& featu
   return result;
 }
 
+// Sums of the passes' values, by component.
+void addPass(std::vector<Blend>& blends, std::vector<Buffer<float>>& sums) {
+  for (size_t c = 0; c < blends.size(); ++c) {
+    if (sums.size() <= c)
+      sums.push_back(std::move(blends[c].value));
+    else
+      for (size_t i = 0; i < sums[c].size(); ++i) sums[c][i] += blends[c].value[i];
+  }
+}
+
 }  // namespace
 
 std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan) {
@@ -118,7 +128,7 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
                                          const Activity& activity, std::span<const JointFilterParams> passes,
                                          float level, const Progress& progress, FilterCounts& counts) {
   const FeatureInput features(data);
-  std::vector<Blend> blends;
+  std::vector<Buffer<float>> result;
   double cost = 0, done = 0;  // in candidate pixels of the windows
   const auto costOf = [](const JointFilterParams& pass) { return double(2 * pass.radius + 1) * (2 * pass.radius + 1); };
   for (const JointFilterParams& pass : passes) cost += costOf(pass);
@@ -127,11 +137,12 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
     done += costOf(passes[i]);
     TileCount count(data, progress, from, done / cost, counts);
     const int pilotPad = i + 1 < passes.size() ? guideBorder(passes[i + 1]) : 0;
-    blends = filterOnce(data, features, guides, activity, passes[i], level, pilotPad, count);
+    std::vector<Blend> blends = filterOnce(data, features, guides, activity, passes[i], level, pilotPad, count);
     for (size_t c = 0; c < guides.size(); ++c) guides[c] = std::move(blends[c].pilot);
+    addPass(blends, result);
   }
-  std::vector<Buffer<float>> result;
-  for (Blend& blend : blends) result.push_back(std::move(blend.value));
+  for (Buffer<float>& values : result)
+    for (float& value : values) value /= float(passes.size());
   return result;
 }
 
