@@ -32,12 +32,6 @@ bool holdsCameraSamples(const deep::DeepImage& image) {
   return part <= 0.5f && double(alike) >= 0.99 * double(share.size()) && share.size() >= filled * 3 / 2;
 }
 
-bool hasStatistics(const deep::PartInfo& part) {
-  return std::any_of(part.channels.begin(), part.channels.end(), [](const deep::ChannelInfo& channel) {
-    return deep::describesSamples(deep::roleOf(channel.name, channel.type));
-  });
-}
-
 void findInputs(SequencePlan& plan, FrameSource& source) {
   const Box window = source.part().dataWindow;
   const deep::DeepImage row = source.read(window.y0, std::min(window.y0 + 1, window.y1), plan.notes);
@@ -69,8 +63,7 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   findInputs(plan, source);
   wantInputs(plan.denoise, source);
   const Box window = source.part().dataWindow;
-  const bool statistics = hasStatistics(source.part());
-  if (wanted && statistics && source.decodedBytes(window.y0, window.y1) <= decodedLimit(options.memory)) {
+  if (wanted && source.hasStatistics() && source.decodedBytes(window.y0, window.y1) <= decodedLimit(options.memory)) {
     plan.firstImage = source.read(plan.notes);
     plan.denoise.level = deep::meanLevel(*plan.firstImage);
     return plan;
@@ -80,7 +73,7 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   });
   const deep::DeepImage colours = source.read(plan.notes);
   plan.denoise.level = deep::meanLevel(colours);
-  plan.cameraSamples = plan.deep && !statistics && holdsCameraSamples(colours);
+  plan.cameraSamples = plan.deep && !source.hasStatistics() && holdsCameraSamples(colours);
   if (plan.cameraSamples) {
     plan.notes = {fmt::format("{}: one deep sample per camera sample: clustered into bins first", inputs.main)};
     source.want({});

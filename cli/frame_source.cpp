@@ -1,12 +1,11 @@
 #include "cli/frame_source.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 
 #include "deep/assemble.h"
+#include "deep/channels.h"
 #include "deep/cluster.h"
 #include "deep/one_bin.h"
 #include "deep/ppu_scale.h"
@@ -35,19 +34,10 @@ std::vector<std::string> namesOf(const deep::PartInfo& part) {
   return names;
 }
 
-// Depth order without merging: bins stay bins. Volumes that overlap have no effective alpha before they are split.
-deep::DeepImage inDepthOrder(deep::DeepImage image, const std::string& path, std::set<std::string>& notes) {
-  const deep::Untidiness found = deep::findUntidiness(image);
-  if (found.volumesOverlap) {
-    deep::TidyResult tidied = deep::tidy(std::move(image));
-    notes.insert(tidied.dropped.empty() ? fmt::format("{}: overlapping volumes are split and merged first", path)
-                                        : fmt::format("{}: overlapping volumes are split and merged first, without {}",
-                                                      path, fmt::join(tidied.dropped, " ")));
-    return std::move(tidied.image);
-  }
-  if (!found.unsorted) return image;
-  notes.insert(fmt::format("{}: samples are sorted front to back first", path));
-  return deep::sortSamples(std::move(image));
+bool anyStatistics(const std::vector<std::string>& channels) {
+  return std::any_of(channels.begin(), channels.end(), [](const std::string& name) {
+    return deep::describesSamples(deep::roleOf(name, deep::PixelType::Float));
+  });
 }
 
 }  // namespace
@@ -56,11 +46,14 @@ class MappedFile {
  public:
   MappedFile(const std::string& path, const std::string& partName, const SourceOptions& options)
       : path_(path), memory_(options.memory), part_(choosePart(path, deep::readParts(path), partName)) {
-    if (options.map) map_ = resolveMap(*options.map, namesOf(part_));
+    const std::vector<std::string> theirs = namesOf(part_);
+    if (options.map) map_ = resolveMap(*options.map, theirs);
+    hasStatistics_ = anyStatistics(mappedNames(map_, theirs));
   }
 
   const std::string& path() const { return path_; }
   const deep::PartInfo& part() const { return part_; }
+  bool hasStatistics() const { return hasStatistics_; }
 
   void want(std::function<bool(const std::string&)> wanted) {
     wanted_ = std::move(wanted);
@@ -77,7 +70,7 @@ class MappedFile {
     }
     deep::DeepImage image = reader().read(y0, y1);
     applyMap(map_, image);
-    return inDepthOrder(std::move(image), path_, notes);
+    return inDepthOrder(std::move(image), notes);
   }
 
   flat::Image readFlat(int y0, int y1) {
@@ -117,6 +110,21 @@ class MappedFile {
     return !renamed && wanted_(theirs);
   }
 
+  // Front to back. Volumes that overlap have no effective alpha: they are split and merged, but not where the file has
+  // statistics of its bins, which no one could split. What is done to a pixel depends on nothing but that pixel.
+  deep::DeepImage inDepthOrder(deep::DeepImage image, std::set<std::string>& notes) const {
+    const deep::Untidiness found = deep::findUntidiness(image);
+    if (found.volumesOverlap && !hasStatistics_) {
+      notes.insert(fmt::format("{}: overlapping volumes are split and merged first", path_));
+      return deep::tidy(std::move(image)).image;
+    }
+    if (found.volumesOverlap)
+      notes.insert(fmt::format("{}: volumes overlap: their alphas are taken one by one", path_));
+    if (!found.unsorted) return image;
+    notes.insert(fmt::format("{}: samples are sorted front to back first", path_));
+    return deep::sortSamples(std::move(image));
+  }
+
   // A flat file's pixels as samples, not yet made bins.
   const deep::DeepImage& pixels() {
     if (!pixels_) {
@@ -139,6 +147,7 @@ class MappedFile {
   size_t memory_;
   deep::PartInfo part_;
   std::vector<MappedChannel> map_;
+  bool hasStatistics_ = false;
   std::function<bool(const std::string&)> wanted_;
   std::optional<deep::Reader> reader_;
   std::optional<deep::DeepImage> pixels_;
@@ -189,6 +198,10 @@ const deep::PartInfo& FrameSource::part() const {
 
 std::map<std::string, std::string> FrameSource::flatAttributes() const {
   return deep() ? std::map<std::string, std::string>{} : main_->flatAttributes();
+}
+
+bool FrameSource::hasStatistics() const {
+  return main_->hasStatistics();
 }
 
 void FrameSource::want(std::function<bool(const std::string&)> wanted) {

@@ -48,6 +48,8 @@ class FrameSource {
   const std::string& path() const;  // of the main file
   bool deep() const;
   const deep::PartInfo& part() const;
+  // Whether the main file has half buffers, variances or counts: its samples are bins.
+  bool hasStatistics() const;
   // What a flat file's output carries along; empty for a deep file.
   std::map<std::string, std::string> flatAttributes() const;
 

@@ -520,5 +520,36 @@ TEST_F(Denoise, UnsortedSamplesAreSorted) {
   for (const char* channel : {"R", "A", "Z", "id"}) expectSameValues(a, b, channel);
 }
 
+TEST_F(Denoise, OverlappingVolumesAreTheSameInBands) {
+  // Volumes that overlap in the last rows only.
+  constexpr int kWidth = 60, kHeight = 200;
+  DeepImage image{{0, 0, kWidth, kHeight}, {0, 0, kWidth, kHeight}, {}, {}, {}};
+  image.offsets = Buffer<uint64_t>(image.pixels() + 1);
+  for (size_t i = 0; i <= image.pixels(); ++i) image.offsets[i] = 2 * i;
+  std::mt19937 random(5);
+  for (const char* name : {"R", "G", "B", "A", "Z", "ZBack"}) {
+    Buffer<float>& values = image.add(name, deep::PixelType::Float).values;
+    for (size_t i = 0; i < values.size(); ++i) {
+      const bool behind = i % 2, overlap = i > values.size() * 9 / 10;
+      const float z = behind ? (overlap ? 1.5f : 3.0f) : 1.0f;
+      values[i] = name[0] == 'Z' ? (name[1] ? z + 1 : z) : name[0] == 'A' ? 0.5f : 0.005f * float(random() % 100);
+    }
+  }
+  deep::write(folder_ / "in.exr", image);
+  ASSERT_EQ(run("in.exr -o whole.exr").status, 0);
+  const Ran outcome = run("in.exr -o bands.exr --memory 3M --stats stats.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_GT(nlohmann::json::parse(bytes("stats.json"))["frames"][0]["bands"], 1);
+  EXPECT_THAT(outcome.err, HasSubstr("overlapping volumes are split and merged first"));
+  EXPECT_GT(deep::read(folder_ / "whole.exr").samples(), image.samples());
+  EXPECT_TRUE(bytes("whole.exr") == bytes("bands.exr"));
+
+  // Where bins have statistics, they stay as they are.
+  image.add("samples", deep::PixelType::Float).values.fill(4);
+  deep::write(folder_ / "bins.exr", image);
+  ASSERT_EQ(run("bins.exr -o out.exr --keep").status, 0);
+  EXPECT_EQ(deep::read(folder_ / "out.exr").samples(), image.samples());
+}
+
 }  // namespace
 }  // namespace fathom

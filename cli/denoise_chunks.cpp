@@ -1,0 +1,150 @@
+#include "cli/denoise_chunks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+
+#include "cli/content_hash.h"
+#include "flat/error.h"
+
+namespace fathom::cli {
+
+namespace {
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// As few bands of as many rows each as that they, with `halo` more rows on both sides, take at most `budget` bytes.
+std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
+  const Box& window = source.part().dataWindow;
+  if (source.decodedBytes(window.y0, window.y1) <= budget) return {{window.y0, window.y1}};
+  std::vector<size_t> upTo = {0};
+  for (int y = window.y0; y < window.y1; ++y) upTo.push_back(upTo.back() + source.decodedBytes(y, y + 1));
+  const auto bytes = [&](const Band& band) {
+    return upTo[size_t(std::min(band.y1 + halo, window.y1) - window.y0)] -
+           upTo[size_t(std::max(band.y0 - halo, window.y0) - window.y0)];
+  };
+  size_t most = 0;
+  for (int height = (window.height() + 1) / 2;; height = (height + 1) / 2) {
+    std::vector<Band> bands;
+    most = 0;
+    for (int y = window.y0; y < window.y1; y += height) {
+      bands.push_back({y, std::min(y + height, window.y1)});
+      most = std::max(most, bytes(bands.back()));
+    }
+    if (most <= budget) return bands;
+    if (height == 1) break;
+  }
+  fail("{}: expected at least {} MB of memory, for a row with the {} around it that decide it; found a limit of {} MB",
+       source.path(), memoryFor(most) / 1'000'000 + 1, 2 * halo, memoryFor(budget) / 1'000'000);
+}
+
+}  // namespace
+
+std::string describeError(const DenoiseFrame& frame) {
+  std::vector<std::string> files = frame.inputs.files();
+  for (const std::string& file : frame.outputs.files()) files.push_back(file);
+  try {
+    throw;
+  } catch (const Error& e) {
+    return namingFile(e.what(), files);
+  } catch (const std::bad_alloc&) {
+    return namingFile("out of memory", files);
+  } catch (const std::exception& e) {
+    return namingFile(oneLine(e.what()), files);
+  }
+}
+
+ChunkReader::ChunkReader(DenoiseJob& job) : job_(job), halo_(deep::denoiseHalo(job.plan.denoise)) {}
+
+std::optional<Chunk> ChunkReader::next() {
+  const Stopwatch watch;
+  if (!source_ && frame_ == job_.frames.size()) return {};
+  Chunk chunk;
+  chunk.frame = frame_;
+  try {
+    if (!source_ && !open()) {
+      chunk.kept = true;
+    } else {
+      chunk.origin = origin_;
+      chunk.band = bands_[band_];
+      chunk.image = read(chunk.notes);
+      chunk.last = ++band_ == bands_.size();
+    }
+  } catch (const std::exception&) {
+    chunk.error = describeError(job_.frames[frame_]);
+    chunk.last = true;
+  }
+  if (chunk.last) close();
+  chunk.seconds = watch.seconds();
+  return chunk;
+}
+
+// False where the outputs are there already.
+bool ChunkReader::open() {
+  const DenoiseFrame& frame = job_.frames[frame_];
+  ContentHash hash;
+  for (const std::string& text : {std::string(FATHOM_VERSION), job_.settings, describePlan(job_.plan)}) hash.add(text);
+  for (const std::string& file : frame.inputs.files()) hash.addFile(file);
+  const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
+  if (isDone(frame.outputs, madeBy)) return false;
+
+  source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
+  bands_ = cutBands(*source_, halo_, decodedLimit(job_.memory));
+  origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
+                                                      source_->part().dataWindow, source_->flatAttributes(), madeBy});
+  return true;
+}
+
+bool ChunkReader::isDone(const FrameOutputs& outputs, const std::string& madeBy) const {
+  bool done = true;
+  for (const std::string& file : outputs.files()) {
+    const Standing standing = standingOf(file, madeBy);
+    if (standing == Standing::Other && !job_.overwrite)
+      fail(
+          "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "
+          "replaces it)",
+          file);
+    done = done && standing == Standing::Ours;
+  }
+  return done;
+}
+
+deep::DeepImage ChunkReader::read(std::set<std::string>& notes) {
+  if (bands_.size() == 1 && job_.plan.firstImage && job_.plan.first == source_->path())
+    return *std::exchange(job_.plan.firstImage, std::nullopt);
+  const Box& window = source_->part().dataWindow;
+  const Band& band = bands_[band_];
+  return source_->read(std::max(band.y0 - halo_, window.y0), std::min(band.y1 + halo_, window.y1), notes);
+}
+
+void ChunkReader::close() {
+  source_.reset();
+  bands_.clear();
+  band_ = 0;
+  ++frame_;
+}
+
+Chunk ChunkWriter::write(Chunk chunk) {
+  const Stopwatch watch;
+  try {
+    if (!sink_) sink_.emplace(job_.frames[chunk.frame].outputs, *chunk.origin);
+    sink_->write(std::move(chunk.image));
+    if (chunk.last) sink_->finish();
+  } catch (const std::exception&) {
+    chunk.error = describeError(job_.frames[chunk.frame]);
+  }
+  if (chunk.last || !chunk.error.empty()) drop();
+  chunk.image = {};
+  chunk.seconds = watch.seconds();
+  return chunk;
+}
+
+}  // namespace fathom::cli

@@ -1,0 +1,71 @@
+// The work on a sequence in pieces: a chunk is a frame, or a band of its rows where the frame does not fit the memory.
+// Bands overlap by the rows that decide a result, so that the bits do not depend on them.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "cli/denoise_sequence.h"
+
+namespace fathom::cli {
+
+struct Band {
+  int y0, y1;
+};
+
+struct Chunk {
+  size_t frame = 0;
+  std::shared_ptr<const FrameOrigin> origin;
+  Band band{0, 0};
+  bool last = true;             // of its frame
+  deep::DeepImage image;        // the band with the rows around it that decide it; then the band denoised
+  bool kept = false;            // nothing to do: the outputs are there
+  std::string error;            // one line; empty: none
+  double seconds = 0;           // of the stage that it comes from
+  std::set<std::string> notes;  // lines for the user
+};
+
+// The error that is being handled, in one line that begins with a file of the frame.
+std::string describeError(const DenoiseFrame& frame);
+
+// The first stage: looks what is there already, and reads.
+class ChunkReader {
+ public:
+  explicit ChunkReader(DenoiseJob& job);
+
+  // The next chunk, or nothing after the last one. A frame that cannot be read is one chunk with an error.
+  std::optional<Chunk> next();
+
+ private:
+  bool open();
+  bool isDone(const FrameOutputs& outputs, const std::string& madeBy) const;
+  deep::DeepImage read(std::set<std::string>& notes);
+  void close();
+
+  DenoiseJob& job_;
+  const int halo_;
+  size_t frame_ = 0, band_ = 0;
+  std::optional<FrameSource> source_;
+  std::vector<Band> bands_;
+  std::shared_ptr<const FrameOrigin> origin_;
+};
+
+// The last stage.
+class ChunkWriter {
+ public:
+  explicit ChunkWriter(const DenoiseJob& job) : job_(job) {}
+
+  // Returns the chunk without its image, with an error where it could not be written.
+  Chunk write(Chunk chunk);
+  // Forgets a frame that is not complete.
+  void drop() { sink_.reset(); }
+
+ private:
+  const DenoiseJob& job_;
+  std::optional<FrameSink> sink_;
+};
+
+}  // namespace fathom::cli
