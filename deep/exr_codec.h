@@ -18,6 +18,11 @@ struct libdeflate_decompressor;
 
 namespace fathom::deep {
 
+// Of a value in the file.
+inline size_t valueBytes(PixelType type) {
+  return type == PixelType::Half ? 2 : 4;
+}
+
 // The most bytes that `packed` bytes can unpack to.
 uint64_t mostUnpacked(Compression compression, uint64_t packed);
 
