@@ -28,10 +28,9 @@ std::optional<Imath::M44d> matrixOf(const Attributes& attributes, const char* na
 // Pixels per unit at depth 1, by how far apart two points are seen that lie at that depth.
 double scaleOf(const Imath::M44d& worldToCamera, const Imath::M44d& worldToNdc, int width) {
   const Imath::M44d cameraToNdc = worldToCamera.inverse(true) * worldToNdc;
-  const auto xAt = [&](double x, double z) { return (Imath::V3d(x, 0, z) * cameraToNdc).x; };
-  // Cameras that look along -z are common, though the standard says +z: a point ahead has a positive w.
-  const double ahead = cameraToNdc[2][3] + cameraToNdc[3][3] >= cameraToNdc[3][3] - cameraToNdc[2][3] ? 1 : -1;
-  const double axis = xAt(0, ahead), unit = std::abs(xAt(1, ahead) - axis);
+  // At z = 1; cameras that look along -z see that behind them, through the same pinhole and at the same size.
+  const auto xAt = [&](double x) { return (Imath::V3d(x, 0, 1) * cameraToNdc).x; };
+  const double axis = xAt(0), unit = std::abs(xAt(1) - axis);
   const double windowInNdc = std::abs(axis) < std::abs(axis - 0.5) ? 2 : 1;
   return unit / windowInNdc * width;
 }

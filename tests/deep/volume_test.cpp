@@ -54,6 +54,7 @@ TEST(Volume, ThinVolumesSplitInProportion) {
 TEST(Volume, PartsOfOpaqueVolumesAreOpaqueWithTheWholeColour) {
   EXPECT_EQ(partOf(1, 0.01).alpha, 1);
   EXPECT_EQ(partOf(1, 0.01).weight, 1);
+  EXPECT_EQ(partOf(1, 0).alpha, 1);  // however thin
 }
 
 TEST(Volume, EmissionSplitsByLength) {
