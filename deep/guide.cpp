@@ -1,6 +1,7 @@
 #include "deep/guide.h"
 
 #include <cmath>
+#include <numeric>
 
 #include "flat/parallel.h"
 
@@ -155,14 +156,24 @@ std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Featu
   std::vector<Buffer<float>> result;
   if (feature.value.empty()) return result;
   const FeatureGuide guide = featureGuide(data, feature, 1);
+  flat::Padded weight(data.width, data.height, 1);
+  parallelFor(0, data.height, [&](int y) {
+    const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
+    for (int x = 0; x < data.width; ++x)
+      weight.row(y)[x] = std::accumulate(data.weight.data() + offsets[x], data.weight.data() + offsets[x + 1], 0.0f);
+  });
+  weight.extend();
   for (size_t c = 0; c < feature.value.size(); ++c) {
     const flat::Padded& value = guide.value.value[c];
     Buffer<float>& gradient = result.emplace_back(size_t(data.width) * size_t(data.height));
     parallelFor(0, data.height, [&](int y) {
-      const float *above = value.row(y - 1), *in = value.row(y), *below = value.row(y + 1);
       float* out = gradient.data() + size_t(y) * size_t(data.width);
       for (int x = 0; x < data.width; ++x) {
-        const float gx = 0.5f * (in[x + 1] - in[x - 1]), gy = 0.5f * (below[x] - above[x]);
+        // A pixel that sees nothing has no value: the feature is taken to go on as it is.
+        const auto at = [&](int dx, int dy) {
+          return weight.row(y + dy)[x + dx] > 0 ? value.row(y + dy)[x + dx] : value.row(y)[x];
+        };
+        const float gx = 0.5f * (at(1, 0) - at(-1, 0)), gy = 0.5f * (at(0, 1) - at(0, -1));
         out[x] = gx * gx + gy * gy;
       }
     });
