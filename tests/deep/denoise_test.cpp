@@ -446,6 +446,108 @@ TEST(Denoise, TakesWhateverGroupIsMissingAlone) {
   }
 }
 
+TEST(Denoise, ReadsOnlyWhatItSays) {
+  for (const char* missing : {"nothing", "half", "variance", "diffuse", "albedo"}) {
+    DeepImage image = renderFrame({.volumes = true}).noisy;
+    dropGroup(image, missing);
+    const DenoisePlan plan = planFor(image);
+    const DeepImage expected = denoise(image.copy(), plan);
+    std::erase_if(image.channels, [&](const Channel& c) { return !denoiseReads(plan.inputs, c.name); });
+    EXPECT_FALSE(image.find("crypto"));
+    EXPECT_EQ(farthest(denoise(std::move(image), plan), expected), 0) << missing;
+  }
+}
+
+// Scene units do not matter, nor next to pixels that see nothing.
+TEST(Denoise, FollowsTheUnitOfDepth) {
+  const DeepImage image = renderFrame({.volumes = true, .empty = [](int x, int y) { return (x + y) % 5 == 0; }}).noisy;
+  const DenoisePlan plan = planFor(image);
+  const DeepImage expected = denoise(image.copy(), plan);
+  for (const float scale : {0.1f, 1e3f, 1e6f}) {
+    DeepImage scaled = image.copy();
+    for (const auto& [channel, power] : {std::pair{"Z", 1}, {"ZBack", 1}, {"variance.Z", 2}})
+      for (float& v : scaled.get(channel)) v *= power == 2 ? scale * scale : scale;
+    EXPECT_LT(farthest(denoise(std::move(scaled), plan), expected), 1e-3) << scale;
+  }
+}
+
+// What a skip leaves out, made not worth skipping by something that nobody sees, gives the same.
+
+TEST(DenoiseSkips, EmptyTiles) {
+  const DeepImage image = renderFrame({.width = 130, .height = 70, .empty = [](int x, int) { return x >= 20; }}).noisy;
+  DeepImage dusty = image.copy();
+  dusty.offsets[0] = 0;
+  std::vector<bool> dust;
+  for (size_t p = 0; p < image.pixels(); ++p) {
+    for (size_t i = 0; i < image.count(p); ++i) dust.push_back(false);
+    if (p % 130 >= 22) dust.push_back(true);
+    dusty.offsets[p + 1] = dust.size();
+  }
+  for (Channel& channel : dusty.channels) {
+    const Channel& from = *image.find(channel.name);
+    Channel& to = channel;
+    to.values = Buffer<float>(channel.type == PixelType::Uint ? 0 : dust.size());
+    to.ids = Buffer<uint32_t>(channel.type == PixelType::Uint ? dust.size() : 0, 0);
+    for (size_t i = 0, b = 0; i < to.values.size(); ++i) {
+      to.values[i] = dust[i] ? 1e-9f : from.values[b];
+      if (dust[i] && channel.name == "A") to.values[i] = 2e-6f;
+      if (dust[i] && channel.name == "Z") to.values[i] = 1e3f;
+      // One camera sample: its noise is unknown.
+      if (dust[i] && channel.name.ends_with("samples")) to.values[i] = channel.name == "half1.samples" ? 0 : 1;
+      b += !dust[i];
+    }
+  }
+  const DenoisePlan plan = planFor(image);
+  DenoiseStats skipping, filtering;
+  const DeepImage a = denoise(image.copy(), plan, {}, &skipping), b = denoise(std::move(dusty), plan, {}, &filtering);
+  EXPECT_GT(skipping.counts["tiles skipped: nothing noisy"], 10u);
+  EXPECT_EQ(filtering.counts["tiles skipped: nothing noisy"], 0u);
+  for (const std::string& name : kColours)
+    for (size_t i = 0, at = 0; i < dust.size(); ++i)
+      if (!dust[i]) {
+        ASSERT_NEAR(b.get(name)[i], a.get(name)[at++], 1e-5) << name;
+      }
+}
+
+TEST(DenoiseSkips, AComponentWithoutLight) {
+  DeepImage dark = renderFrame().noisy;
+  for (Channel& channel : dark.channels)
+    if (channel.name.find("specular") != std::string::npos) channel.values.fill(0);
+  DeepImage dim = dark.copy();
+  for (Channel& channel : dim.channels)
+    if (channel.name.find("specular") != std::string::npos) channel.values.fill(1e-12f);
+  const DenoisePlan plan = planFor(dark);
+  DenoiseStats skipping, filtering;
+  const DeepImage a = denoise(std::move(dark), plan, {}, &skipping), b = denoise(std::move(dim), plan, {}, &filtering);
+  EXPECT_GT(skipping.counts["tiles where a component has no light"], 0u);
+  EXPECT_EQ(filtering.counts["tiles where a component has no light"], 0u);
+  EXPECT_LT(farthest(a, b), 1e-6);
+}
+
+// The bound: where the halves agree, what is kept is at most 1 % of the mean colour (rms) from what the filter would
+// make of it, and nearer to the truth.
+TEST(DenoiseSkips, WhatIsStill) {
+  const int half = 40;
+  const RenderedFrame frame =
+      renderFrame({.width = 96, .height = 40, .noise = [&](int x, int) { return x < half ? 0.7f : 0.0f; }});
+  const DeepImage& image = frame.noisy;
+  DeepImage restless = image.copy();
+  const auto alpha = image.get("A");
+  for (const std::string& rgb : kRgb) {
+    const auto colour = image.get(rgb);
+    const auto variance = restless.get("variance." + rgb);
+    for (size_t b = 0; b < colour.size(); ++b) variance[b] += std::pow(0.05f * colour[b] / alpha[b], 2.0f);
+  }
+  const DenoisePlan plan = planFor(image, {.gate = false});
+  DenoiseStats skipping, filtering;
+  const DeepImage a = denoise(image.copy(), plan, {}, &skipping),
+                  b = denoise(std::move(restless), plan, {}, &filtering);
+  EXPECT_GT(skipping.counts["pixels kept: nothing noisy"], 1000u);
+  EXPECT_EQ(filtering.counts["pixels kept: nothing noisy"], 0u);
+  EXPECT_LT(std::sqrt(binError(a, b)), 0.01 * double(plan.level));
+  EXPECT_LT(binError(a, frame.truth), binError(b, frame.truth));
+}
+
 TEST(Denoise, VolumesAreBinsLikeOthers) {
   const RenderedFrame frame = renderFrame({.volumes = true});
   const DeepImage out = run(frame.noisy);

@@ -23,6 +23,8 @@ struct FrameParams {
   // How noisy the camera samples are at a pixel of the window, counted from its corner: each is (1 - noise) of the
   // light and noise times an exponentially distributed part, which has the same mean.
   std::function<float(int x, int y)> noise = [](int, int) { return 0.7f; };
+  // What sees nothing: by default a corner.
+  std::function<bool(int x, int y)> empty = [](int x, int y) { return x < 6 && y < 5; };
   // The light on a bin without its noise.
   std::function<float(int x, int y)> light = [](int x, int y) { return 0.6f + 0.3f * std::sin(0.11f * float(x + y)); };
 };
@@ -45,7 +47,7 @@ struct FrameBin {
 
 inline std::vector<FrameBin> binsOf(const FrameParams& p, int x, int y, std::mt19937& random) {
   std::vector<FrameBin> bins;
-  if (x < p.width / 8 && y < p.height / 8) return bins;  // a corner sees nothing
+  if (p.empty(x, y)) return bins;
   int left = p.spp;
   const auto add = [&](int samples, float z, float zBack, const std::array<float, 3>& albedo, float nx, float specular,
                        uint32_t id) {
