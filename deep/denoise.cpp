@@ -87,10 +87,6 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   DenoiseData data = prepareDenoise(image, plan.inputs);
   dropStatistics(image, plan.params, false);
   clock.lap("prepare");
-  prefilterFeatures(data);
-  clock.lap("prefilter");
-  progress.at(0.1);
-
   const std::vector<JointFilterParams> passes = filterPasses(plan);
   std::vector<ComponentGuide> guides;
   for (const DenoiseComponent& component : data.components)
@@ -99,6 +95,11 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   const auto ofPixels = pixelVariance(data, guides, plan.inputs);
   countPixels(data, activity, stats);
   clock.lap("guides");
+  progress.at(0.05);
+  int reach = 0;  // of the bank's windows, and a pixel more for gradients
+  for (const JointFilterParams& pass : passes) reach = std::max(reach, pass.radius + 1);
+  prefilterFeatures(data, activity, reach);
+  clock.lap("prefilter");
   progress.at(0.15);
 
   FilterCounts counts;

@@ -44,7 +44,7 @@ void takeBlock(const FilterTile& tile, size_t i, size_t bin, int block, Feature&
 
 }  // namespace
 
-void prefilterFeatures(DenoiseData& data) {
+void prefilterFeatures(DenoiseData& data, const Activity& activity, int reach) {
   if (data.albedo.value.empty() && data.normal.value.empty()) return;
   const JointFilterParams params = prefilterParams();
   const int pad = params.radius + params.patchRadius;
@@ -64,14 +64,8 @@ void prefilterFeatures(DenoiseData& data) {
   input.features = {{data.depth.value[0].data(), data.depth.variance[0].data(), gradient[0].data()}};
   input.components = {
       {packed.data(), {&guides[0].value, &guides[1].value}, {&guides[0].variance, &guides[1].variance}}};
-  const auto anyBin = [&](const Box& tile) -> unsigned {
-    for (int y = tile.y0; y < tile.y1; ++y) {
-      const uint64_t* row = data.offsets + size_t(y) * size_t(data.width);
-      if (row[tile.x1] > row[tile.x0]) return 1;
-    }
-    return 0;
-  };
-  jointFilter(input, params, anyBin, [&](const FilterTile& tile) {
+  const auto read = [&](const Box& tile) { return unsigned(activeNear(data, activity, tile, reach)); };
+  jointFilter(input, params, read, [&](const FilterTile& tile) {
     size_t i = 0;
     for (int y = tile.box.y0; tile.active && y < tile.box.y1; ++y) {
       const uint64_t* row = data.offsets + size_t(y) * size_t(data.width);

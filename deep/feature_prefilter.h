@@ -5,6 +5,7 @@
 #pragma once
 
 #include "deep/denoise_data.h"
+#include "deep/still.h"
 
 namespace fathom::deep {
 
@@ -13,6 +14,8 @@ inline constexpr int kPrefilterRadius = 2, kPrefilterPatchRadius = 1;
 // Replaces albedo and normal, where the data has them, by filtered ones, and their variances by those of the filtered
 // means: the bin's own share of the weights times its variance, which is exact where the neighbours are as noisy and
 // weigh the same.
-void prefilterFeatures(DenoiseData& data);
+//
+// Only where it will be read: in tiles with a pixel that is not still within `reach`.
+void prefilterFeatures(DenoiseData& data, const Activity& activity, int reach);
 
 }  // namespace fathom::deep

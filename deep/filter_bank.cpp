@@ -86,8 +86,22 @@ std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& featu
   jointFilter(input, pass, active, consume);
   std::vector<Blend> result;
   for (Candidates& candidate : candidates)
-    result.push_back(blendCandidates(data, std::move(candidate), level, pilotPad));
+    result.push_back(blendCandidates(data, activity.still, std::move(candidate), level, pilotPad));
   return result;
+}
+
+// Still pixels are not filtered: their guides stay.
+void copyStill(const DenoiseData& data, const Buffer<uint8_t>& still, const ComponentGuide& from, ComponentGuide& to) {
+  const auto copy = [&](const flat::Padded& source, flat::Padded& target) {
+    for (int y = 0; y < data.height; ++y)
+      for (int x = 0; x < data.width; ++x)
+        if (still[size_t(y) * size_t(data.width) + size_t(x)]) target.row(y)[x] = source.row(y)[x];
+    target.extend();
+  };
+  for (size_t c = 0; c < 3; ++c) {
+    for (size_t h = 0; h < 2; ++h) copy(from.value[h].value[c], to.value[h].value[c]);
+    copy(from.variance.value[c], to.variance.value[c]);
+  }
 }
 
 // Sums of the passes' values, by component.
@@ -138,7 +152,10 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
     TileCount count(data, progress, from, done / cost, counts);
     const int pilotPad = i + 1 < passes.size() ? guideBorder(passes[i + 1]) : 0;
     std::vector<Blend> blends = filterOnce(data, features, guides, activity, passes[i], level, pilotPad, count);
-    for (size_t c = 0; c < guides.size(); ++c) guides[c] = std::move(blends[c].pilot);
+    for (size_t c = 0; c < guides.size() && pilotPad > 0; ++c) {
+      copyStill(data, activity.still, guides[c], blends[c].pilot);
+      guides[c] = std::move(blends[c].pilot);
+    }
     addPass(blends, result);
   }
   for (Buffer<float>& values : result)

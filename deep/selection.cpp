@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "deep/still.h"
 #include "flat/bilateral.h"
 #include "flat/parallel.h"
 
@@ -201,7 +202,8 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
   }
 }
 
-Blend blendCandidates(const DenoiseData& data, Candidates candidates, float level, int pad) {
+Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Candidates candidates, float level,
+                      int pad) {
   for (flat::Padded& plane : candidates.error) plane.extend();
   for (flat::Padded& plane : candidates.flattened) plane.extend();
   std::vector<flat::Padded> smooth;
@@ -210,7 +212,10 @@ Blend blendCandidates(const DenoiseData& data, Candidates candidates, float leve
   params.radius = kErrorRadius;
   params.sharpness = kErrorSharpness;
   params.floor = 4e-4f * level * level;
-  flat::bilateral(data.width, data.height, params, candidates.flattened, candidates.error, smooth);
+  // Still pixels keep their colours: only what is blurred into others is wanted there.
+  Buffer<uint8_t> wanted = allWithin(still, data.width, data.height, kBlendRadius);
+  for (uint8_t& w : wanted) w = !w;
+  flat::bilateral(data.width, data.height, params, wanted, candidates.flattened, candidates.error, smooth);
   blendWeights(data, level, smooth);
   parallelFor(0, data.height, [&](int y) {
     const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);

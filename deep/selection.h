@@ -44,6 +44,7 @@ struct Blend {
 };
 
 // Blends the candidates and takes their storage. `level`: the mean colour of the frame; `pad`: the border of the pilot.
-Blend blendCandidates(const DenoiseData& data, Candidates candidates, float level, int pad);
+Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Candidates candidates, float level,
+                      int pad);
 
 }  // namespace fathom::deep

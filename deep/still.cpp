@@ -80,6 +80,11 @@ PixelNoise noiseOfFile(const DenoiseData& data, const FileNoise& file, size_t pi
   return noise;
 }
 
+Box around(const DenoiseData& data, const Box& tile, int reach) {
+  return intersect({tile.x0 - reach, tile.y0 - reach, tile.x1 + reach, tile.y1 + reach},
+                   {0, 0, data.width, data.height});
+}
+
 // dst[i] = all of src within radius (windows end at the ends), along one direction with the given step.
 void erode(const uint8_t* src, uint8_t* dst, int count, size_t step, int radius) {
   int lastBad = -radius - 1;
@@ -93,10 +98,20 @@ void erode(const uint8_t* src, uint8_t* dst, int count, size_t step, int radius)
 
 }  // namespace
 
+Buffer<uint8_t> allWithin(const Buffer<uint8_t>& flags, int width, int height, int radius) {
+  const size_t stride = size_t(width);
+  Buffer<uint8_t> across(flags.size()), result(flags.size());
+  parallelFor(0, height, [&](int y) {
+    erode(flags.data() + size_t(y) * stride, across.data() + size_t(y) * stride, width, 1, radius);
+  });
+  parallelFor(0, width, [&](int x) { erode(across.data() + x, result.data() + x, height, stride, radius); });
+  return result;
+}
+
 Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
                       const DenoiseInputs& inputs, int radius, float level) {
   const size_t width = size_t(data.width), pixels = width * size_t(data.height);
-  Activity activity{Buffer<uint8_t>(pixels), Buffer<uint8_t>(pixels)};
+  Activity activity{{}, Buffer<uint8_t>(pixels)};
   FileNoise file;
   if (inputs.variance) {
     file.variance = {image.get("variance.R"), image.get("variance.G"), image.get("variance.B")};
@@ -109,7 +124,7 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
     if (inputs.variance) return noiseOfFile(data, file, pixel).quiet(level);
     return data.halves || quietGuides(guides, x, y, level);
   };
-  Buffer<uint8_t> calm(pixels), across(pixels);
+  Buffer<uint8_t> calm(pixels);
   parallelFor(0, data.height, [&](int y) {
     for (int x = 0; x < data.width; ++x) {
       const size_t pixel = size_t(y) * width + size_t(x);
@@ -125,10 +140,8 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
             activity.light[pixel] = uint8_t(activity.light[pixel] | 1u << c);
         }
     }
-    erode(calm.data() + size_t(y) * width, across.data() + size_t(y) * width, data.width, 1, radius);
   });
-  parallelFor(0, data.width,
-              [&](int x) { erode(across.data() + x, activity.still.data() + x, data.height, width, radius); });
+  activity.still = allWithin(calm, data.width, data.height, radius);
   parallelFor(0, data.height, [&](int y) {
     for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel)
       if (data.offsets[pixel] == data.offsets[pixel + 1]) activity.still[pixel] = 1;
@@ -136,13 +149,17 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
   return activity;
 }
 
+bool activeNear(const DenoiseData& data, const Activity& activity, const Box& tile, int reach) {
+  const Box box = around(data, tile, reach);
+  for (int y = box.y0; y < box.y1; ++y)
+    for (int x = box.x0; x < box.x1; ++x)
+      if (!activity.still[size_t(y) * size_t(data.width) + size_t(x)]) return true;
+  return false;
+}
+
 unsigned activeComponents(const DenoiseData& data, const Activity& activity, const Box& tile, int radius) {
-  bool any = false;
-  for (int y = tile.y0; y < tile.y1 && !any; ++y)
-    for (int x = tile.x0; x < tile.x1 && !any; ++x) any = !activity.still[size_t(y) * size_t(data.width) + size_t(x)];
-  if (!any) return 0;
-  const Box reach = intersect({tile.x0 - radius, tile.y0 - radius, tile.x1 + radius, tile.y1 + radius},
-                              {0, 0, data.width, data.height});
+  if (!activeNear(data, activity, tile, 0)) return 0;
+  const Box reach = around(data, tile, radius);
   unsigned light = 0;
   for (int y = reach.y0; y < reach.y1; ++y)
     for (int x = reach.x0; x < reach.x1; ++x) light |= activity.light[size_t(y) * size_t(data.width) + size_t(x)];

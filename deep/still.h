@@ -20,6 +20,12 @@ struct Activity {
 Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
                       const DenoiseInputs& inputs, int radius, float level);
 
+// 1 where `flags` is not 0 for all pixels within `radius` (a square window that ends at the image's edges).
+Buffer<uint8_t> allWithin(const Buffer<uint8_t>& flags, int width, int height, int radius);
+
+// Whether any pixel within `reach` of a tile is not still.
+bool activeNear(const DenoiseData& data, const Activity& activity, const Box& tile, int reach);
+
 // The components that a tile needs: bit c where a pixel is not still and component c has light within reach.
 unsigned activeComponents(const DenoiseData& data, const Activity& activity, const Box& tile, int radius);
 

@@ -1,5 +1,6 @@
 #include "flat/bilateral.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace fathom::flat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void BilateralRow(int y, int width, const BilateralParams& params, std::span<const Padded> guide,
+void BilateralRow(int y, int width, const BilateralParams& params, const uint8_t* wanted, std::span<const Padded> guide,
                   std::span<const Padded> in, std::span<Padded> out) {
   const hn::ScalableTag<float> d;
   const int N = int(hn::Lanes(d));
@@ -25,6 +26,10 @@ void BilateralRow(int y, int width, const BilateralParams& params, std::span<con
   const float fall = -0.5f / (params.sigma * params.sigma);
   constexpr size_t kMost = 4;
   for (int x = 0; x < width; x += N) {
+    if (std::none_of(wanted + x, wanted + std::min(x + N, width), [](uint8_t w) { return w != 0; })) {
+      for (Padded& plane : out) hn::StoreU(hn::Zero(d), d, plane.row(y) + x);
+      continue;
+    }
     auto weight = hn::Zero(d);
     hn::Vec<decltype(d)> sum[kMost] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     for (int dy = -R; dy <= R; ++dy) {
@@ -56,9 +61,11 @@ namespace fathom::flat {
 
 HWY_EXPORT(BilateralRow);
 
-void bilateral(int width, int height, const BilateralParams& params, std::span<const Padded> guide,
-               std::span<const Padded> in, std::span<Padded> out) {
-  parallelFor(0, height, [&](int y) { HWY_DYNAMIC_DISPATCH(BilateralRow)(y, width, params, guide, in, out); });
+void bilateral(int width, int height, const BilateralParams& params, const Buffer<uint8_t>& wanted,
+               std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out) {
+  parallelFor(0, height, [&](int y) {
+    HWY_DYNAMIC_DISPATCH(BilateralRow)(y, width, params, wanted.data() + size_t(y) * size_t(width), guide, in, out);
+  });
 }
 
 }  // namespace fathom::flat

@@ -1,6 +1,7 @@
 // A cross-bilateral mean: planes averaged where a guide is alike, which is NL-Means with patches of one pixel.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "flat/padded.h"
@@ -14,9 +15,10 @@ struct BilateralParams {
   float floor = 1e-4f;  // squared guide values below this are alike
 };
 
-// Weighted means of the planes `in`, into `out` (as many, of width x height; none of them an input). All inputs are
-// padded by at least `radius` and extended. Values are finite and below 1e17 in the guide, so that squares are.
-void bilateral(int width, int height, const BilateralParams& params, std::span<const Padded> guide,
-               std::span<const Padded> in, std::span<Padded> out);
+// `wanted`: one byte per pixel; where it is 0 the result may be anything finite. Weighted means of the planes `in`,
+// into `out` (as many, of width x height; none of them an input). All inputs are padded by at least `radius` and
+// extended. Values are finite and below 1e17 in the guide, so that squares are.
+void bilateral(int width, int height, const BilateralParams& params, const Buffer<uint8_t>& wanted,
+               std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out);
 
 }  // namespace fathom::flat

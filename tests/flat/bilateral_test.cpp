@@ -28,7 +28,7 @@ void expectLikeTwin(int width, int height, int guides, int count, const Bilatera
   const auto in = randomPlanes(count, width, height, params.radius, 2);
   std::vector<Padded> out;
   for (int i = 0; i < count; ++i) out.emplace_back(width, height, 0);
-  bilateral(width, height, params, guide, in, out);
+  bilateral(width, height, params, Buffer<uint8_t>(size_t(width) * size_t(height), 1), guide, in, out);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const std::vector<double> expected = reference::bilateral(x, y, params, guide, in);
@@ -61,7 +61,7 @@ TEST(Bilateral, KeepsAConstantAndStopsAtAnEdgeOfTheGuide) {
     }
   guide[0].extend();
   in[0].extend();
-  bilateral(40, 8, {.sharpness = 50}, guide, in, out);
+  bilateral(40, 8, {.sharpness = 50}, Buffer<uint8_t>(40 * 8, 1), guide, in, out);
   for (int y = 0; y < 8; ++y)
     for (int x = 0; x < 40; ++x) ASSERT_NEAR(out[0].row(y)[x], x < 20 ? 2 : 7, 1e-5);
 }
