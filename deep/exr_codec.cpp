@@ -91,8 +91,8 @@ void packRuns(std::span<const uint8_t> bytes, std::vector<uint8_t>& to) {
   }
 }
 
-// Level 4 takes 1.4 times as long and saves 1.5 % of the file.
-constexpr int kDeflateLevel = 1;
+// Files as large as OpenEXR's at its default. Level 1 takes three quarters of the time for files up to 7 % larger.
+constexpr int kDeflateLevel = 2;
 
 }  // namespace
 
