@@ -1,5 +1,4 @@
-// What a channel means when samples are composited, merged or split. The name decides (see the convention in the
-// README).
+// What a channel means when samples are composited, merged or split; the name decides, as docs/channels.md has it.
 #pragma once
 
 #include <string_view>
