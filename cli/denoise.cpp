@@ -1,17 +1,17 @@
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "cli/commands.h"
 #include "cli/denoise_sequence.h"
+#include "cli/denoise_stats.h"
 #include "cli/interrupt.h"
 #include "cli/sequence.h"
 #include "flat/error.h"
@@ -143,42 +143,6 @@ std::string firstToDo(const DenoiseJob& job) {
   return std::filesystem::exists(frame.outputs.image) ? "" : frame.inputs.main;
 }
 
-int64_t peakMemory() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return int64_t(usage.ru_maxrss) * 1024;
-}
-
-void writeStats(const std::string& path, const std::vector<DenoiseFrame>& frames,
-                const std::vector<FrameReport>& reports) {
-  using Json = nlohmann::ordered_json;
-  Json list = Json::array();
-  deep::DenoiseStats total;
-  std::map<std::string, int> statuses = {{"done", 0}, {"kept", 0}, {"failed", 0}};
-  for (size_t i = 0; i < reports.size(); ++i) {
-    const FrameReport& report = reports[i];
-    const char* status = report.status == FrameReport::Status::Done   ? "done"
-                         : report.status == FrameReport::Status::Kept ? "kept"
-                                                                      : "failed";
-    ++statuses[status];
-    Json frame = {
-        {"input", frames[i].inputs.main}, {"output", frames[i].outputs.image}, {"status", status},
-        {"bands", report.bands},          {"seconds", report.stats.seconds},   {"counts", report.stats.counts}};
-    if (!report.error.empty()) frame["error"] = report.error;
-    list.push_back(std::move(frame));
-    for (const auto& [stage, seconds] : report.stats.seconds) total.seconds[stage] += seconds;
-    for (const auto& [what, count] : report.stats.counts) total.counts[what] += count;
-  }
-  const Json root = {{"version", FATHOM_VERSION},
-                     {"frames", std::move(list)},
-                     {"total", {{"frames", statuses}, {"seconds", total.seconds}, {"counts", total.counts}}},
-                     {"peakMemory", peakMemory()}};
-  std::ofstream file(path);
-  // File names may hold any bytes; JSON holds text.
-  file << root.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
-  if (!file.flush()) fail("{}: expected a file that can be written", path);
-}
-
 // Frames that ought to be there and are not; true where that is a failure.
 bool reportMissing(const DenoiseCommand& command, const Sequence& sequence) {
   if (sequence.missing.empty()) return false;
@@ -188,14 +152,8 @@ bool reportMissing(const DenoiseCommand& command, const Sequence& sequence) {
   return failure;
 }
 
-void runDenoise(const DenoiseCommand& command) {
-  const Interrupt interrupt;
-  const int threads = command.threads > 0 ? command.threads : int(std::max(1u, std::thread::hardware_concurrency()));
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(threads));
-
-  if (!command.frames.empty() && !parsePattern(command.input).numbered())
-    usage("--frames", fmt::format("expected a sequence such as name.####.exr, found {}", command.input));
-  const Sequence sequence = findSequence(command.input, command.frames);
+// The job without its plan.
+DenoiseJob makeJob(const DenoiseCommand& command, const Sequence& sequence, int threads) {
   DenoiseJob job;
   job.frames = framesOf(command, sequence);
   for (const DenoiseFrame& frame : job.frames) checkOutputs(frame);
@@ -205,19 +163,37 @@ void runDenoise(const DenoiseCommand& command) {
   job.overlap = threads > 1;
   job.overwrite = command.overwrite;
   job.settings = describeSettings(command, job.source);
+  return job;
+}
 
+// From the first frame of the sequence on disk, whether it is among the job's or not.
+SequencePlan makePlan(const DenoiseCommand& command, const Sequence& sequence, const DenoiseJob& job) {
   std::vector<FrameInputs> candidates;
   if (sequence.pattern.numbered())
     for (const int frame : framesOnDisk(sequence.pattern)) candidates.push_back(inputsAt(command, frame));
   else
     candidates.push_back(job.frames.front().inputs);
-  job.plan = planSequence(candidates, job.source, paramsOf(command), firstToDo(job));
-  if (!job.plan.deep && !command.flattened.empty())
+  SequencePlan plan = planSequence(candidates, job.source, paramsOf(command), firstToDo(job));
+  if (!plan.deep && !command.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", command.input);
-  if (command.components && !job.plan.denoise.inputs.components)
+  if (command.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", command.input);
-  for (const std::string& note : job.plan.notes) fmt::print(stderr, "{}\n", note);
+  for (const std::string& note : plan.notes) fmt::print(stderr, "{}\n", note);
+  return plan;
+}
 
+void runDenoise(const DenoiseCommand& command) {
+  const Interrupt interrupt;
+  const int threads = command.threads > 0 ? command.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(threads));
+  if (!command.frames.empty() && !parsePattern(command.input).numbered())
+    usage("--frames", fmt::format("expected a sequence such as name.####.exr, found {}", command.input));
+
+  const auto start = std::chrono::steady_clock::now();
+  const Sequence sequence = findSequence(command.input, command.frames);
+  DenoiseJob job = makeJob(command, sequence, threads);
+  job.plan = makePlan(command, sequence, job);
+  const double planSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const bool missing = reportMissing(command, sequence);
   const std::vector<DenoiseFrame> frames = job.frames;
   std::vector<FrameReport> reports;
@@ -225,10 +201,11 @@ void runDenoise(const DenoiseCommand& command) {
     ProgressDisplay display(frames.size());
     reports = denoiseSequence(std::move(job), display, interrupt.token());
   }
-  if (!command.stats.empty()) writeStats(command.stats, frames, reports);
-  for (const FrameReport& report : reports)
-    if (report.status == FrameReport::Status::Failed) throw Incomplete();
-  if (missing) throw Incomplete();
+  if (!command.stats.empty()) writeStats(command.stats, frames, reports, planSeconds);
+  const bool failed = std::any_of(reports.begin(), reports.end(), [](const FrameReport& report) {
+    return report.status == FrameReport::Status::Failed;
+  });
+  if (failed || missing) throw Incomplete();
 }
 
 }  // namespace
