@@ -54,7 +54,7 @@ void splitBytes(std::span<const uint8_t> bytes, uint8_t* to) {
 bool unpackRuns(std::span<const uint8_t> packed, std::span<uint8_t> to) {
   size_t in = 0, out = 0;
   while (in < packed.size()) {
-    const int n = int8_t(packed[in++]);
+    const int byte = packed[in++], n = byte < 128 ? byte : byte - 256;
     const size_t length = size_t(n < 0 ? -n : n + 1);
     const size_t used = n < 0 ? length : 1;
     if (used > packed.size() - in || length > to.size() - out) return false;

@@ -57,7 +57,7 @@ uint64_t chunkBytes(const ExrFile& file, const PartInfo& part, uint64_t at) {
 
 }  // namespace
 
-ExrOutput::ExrOutput(const std::string& path, Imf::Header header, size_t chunks, const std::string& otherPartsOf,
+ExrOutput::ExrOutput(const std::string& path, const Imf::Header& header, size_t chunks, const std::string& otherPartsOf,
                      int replacedPart)
     : file_(path) {
   std::optional<ExrFile> other;
@@ -67,7 +67,7 @@ ExrOutput::ExrOutput(const std::string& path, Imf::Header header, size_t chunks,
   if (own_ >= count) fail("{}: expected part {}, found {} parts", otherPartsOf, replacedPart, count);
   for (size_t i = 0; i < count; ++i) {
     if (i == own_)
-      parts_.push_back({std::move(header), std::vector<uint64_t>(chunks)});
+      parts_.push_back({header, std::vector<uint64_t>(chunks)});
     else
       parts_.push_back({other->parts()[i].attributes.header(), other->chunkTable(other->parts()[i])});
     parts_[i].header.setChunkCount(int(parts_[i].table.size()));

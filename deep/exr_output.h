@@ -29,7 +29,7 @@ class ExrOutput {
  public:
   // `header` is that of the part to be written, of `chunks` chunks. Where `otherPartsOf` names a file, it takes the
   // place of that file's part `replacedPart` and its name, and the other parts are copied now.
-  ExrOutput(const std::string& path, Imf::Header header, size_t chunks, const std::string& otherPartsOf,
+  ExrOutput(const std::string& path, const Imf::Header& header, size_t chunks, const std::string& otherPartsOf,
             int replacedPart);
 
   const std::string& path() const { return file_.path(); }
