@@ -1,3 +1,4 @@
+// `fathom denoise`: its options, and what they make of a sequence.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <unistd.h>

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <new>
 
 #include "cli/content_hash.h"
@@ -12,14 +11,6 @@
 namespace fathom::cli {
 
 namespace {
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 // As few bands of as many rows each as that they, with `halo` more rows on both sides, take at most `budget` bytes.
 std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {

@@ -53,6 +53,7 @@ class SequenceRun {
       if (told_.insert(note).second) display_.tell(note);
     if (!report.error.empty()) return false;  // an earlier band failed
     report.stats.seconds["read"] += chunk.seconds;
+    report.seconds += chunk.seconds;
     ++report.bands;
     if (chunk.error.empty() && !chunk.kept) denoise(chunk, report);
     if (chunk.kept) {
@@ -74,6 +75,7 @@ class SequenceRun {
           display_.at((chunk.band.y0 - window.y0 + done * (chunk.band.y1 - chunk.band.y0)) / height);
         },
         stop_};
+    const Stopwatch watch;
     try {
       chunk.image = deep::denoise(std::move(chunk.image), job_.plan.denoise, progress, &report.stats);
       const Box& around = chunk.image.dataWindow;
@@ -84,6 +86,7 @@ class SequenceRun {
     } catch (const std::exception&) {
       chunk.error = describeError(job_.frames[chunk.frame]);
     }
+    report.seconds += watch.seconds();
   }
 
   void finishWriting() {
@@ -91,15 +94,14 @@ class SequenceRun {
     const Chunk chunk = writing_.get();
     FrameReport& report = reports_[chunk.frame];
     report.stats.seconds["write"] += chunk.seconds;
+    report.seconds += chunk.seconds;
     if (!chunk.error.empty()) return failed(chunk);
     if (!chunk.last) return;
-    double seconds = 0;
-    for (const auto& [stage, time] : report.stats.seconds) seconds += time;
     if (const auto found = report.stats.counts.find("non-finite samples");
         found != report.stats.counts.end() && found->second > 0)
       display_.tell(fmt::format("{}: {} samples without a finite colour got the filtered one",
                                 job_.frames[chunk.frame].inputs.main, found->second));
-    display_.frameDone(fmt::format("{}: {:.1f} s", job_.frames[chunk.frame].outputs.image, seconds));
+    display_.frameDone(fmt::format("{}: {:.1f} s", job_.frames[chunk.frame].outputs.image, report.seconds));
   }
 
   void failed(const Chunk& chunk) {

@@ -33,6 +33,7 @@ struct FrameReport {
   Status status = Status::Done;
   std::string error;         // one line
   deep::DenoiseStats stats;  // of the denoiser, and the seconds of "read" and "write"
+  double seconds = 0;        // reading, denoising and writing together
   int bands = 0;
 };
 
