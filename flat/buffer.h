@@ -12,7 +12,8 @@
 
 namespace fathom {
 
-// `size` elements aligned to 64 bytes, followed by 64 readable bytes, so that a vector load that starts inside never faults.
+// `size` elements aligned to 64 bytes, followed by 64 readable bytes, so that a vector load that starts inside never
+// faults.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -17,7 +17,9 @@ struct Plane {
   std::string name;      // full EXR name: "R", "albedo.G"
   Buffer<float> values;  // dataWindow.area() elements
 
-  std::span<const float> row(int width, int r) const { return {values.data() + size_t(r) * size_t(width), size_t(width)}; }
+  std::span<const float> row(int width, int r) const {
+    return {values.data() + size_t(r) * size_t(width), size_t(width)};
+  }
 };
 
 struct Image {

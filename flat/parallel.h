@@ -1,24 +1,33 @@
 // Rows in parallel. Work is cut into fixed tiles that do not depend on the number of threads, so results do not either.
 #pragma once
 
+#ifdef __SANITIZE_THREAD__
+// ThreadSanitizer cannot see how tasks are handed over inside Debian's libtbb and takes every result for a race.
+#include "flat/parallel_threads.h"
+#else
 #include <tbb/parallel_for.h>
+#endif
 
 namespace fathom {
+
+// Calls body(i) for every index in [begin, end).
+template <class Body>
+void parallelFor(int begin, int end, const Body& body) {
+#ifdef __SANITIZE_THREAD__
+  forEachOnThreads(begin, end, body);
+#else
+  tbb::parallel_for(begin, end, body);
+#endif
+}
 
 // Calls body(first, last) on consecutive ranges of at most `grain` indices that cover [begin, end).
 template <class Body>
 void parallelRanges(int begin, int end, int grain, const Body& body) {
   const int tiles = end > begin ? (end - begin - 1) / grain + 1 : 0;
-  tbb::parallel_for(0, tiles, [&](int tile) {
+  parallelFor(0, tiles, [&](int tile) {
     const int first = begin + tile * grain;
     body(first, first + grain < end ? first + grain : end);
   });
-}
-
-// Calls body(i) for every index in [begin, end).
-template <class Body>
-void parallelFor(int begin, int end, const Body& body) {
-  tbb::parallel_for(begin, end, body);
 }
 
 }  // namespace fathom
