@@ -2,10 +2,10 @@
 //
 // One line per layer or channel, ours = theirs; everything after a # is a comment:
 //
-//   albedo   = diffuse_albedo          a layer: its three channels, whether they end in R G B, r g b, red green blue or
-//   X Y Z specular = RGB - diffuse           sums and differences, blanks around the sign; RGB is the layer of R, G and
-//   B N        = Nworld unpremultiplied  the file's values are not multiplied with alpha: this is done on reading ZBack
-//   = Zback                   a single channel, by its full name
+//   albedo   = diffuse_albedo          a layer: three channels that end in R G B, r g b, red green blue or X Y Z
+//   specular = RGB - diffuse           sums and differences, blanks around the sign; RGB is the layer of R, G and B
+//   N        = Nworld unpremultiplied  the file's values are not multiplied with alpha: this is done on reading
+//   ZBack    = Zback                   a single channel, by its full name
 //
 // The right side always names the channels of the file, whatever other lines make of them. A channel that is taken over
 // as it is goes by our name from then on; the terms of a sum stay in the file beside it. A line of which the file has

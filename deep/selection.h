@@ -2,13 +2,12 @@
 //
 // Source: Vicini et al., section 4.2, "Color filtering". Three departures, each measured on the shared renders:
 // - Equation 13 compares a filtered half with the other half. With crossed weights the filtered half already knows the
-// other
-//   half's noise, and strong colour weights look better than they are. Given weights that do not know it, the filter is
+//   other half's noise, and strong colour weights look better than they are. Given weights that do not know it, the filter is
 //   linear in its own half and Stein's estimate needs no derivative of the weights: MSE[F_h] = (F_h - C_h)^2 - (1 - 2
 //   s_h) Var[C_h], with s_h the share of the sum of weights that the pixel itself has; and MSE[F] = (MSE[F_0] +
 //   MSE[F_1]) / 2 - Var[F], with Var[F] = (F_0 - F_1)^2 / 4 as in the paper.
 // - The estimates are smoothed by the flat filter over 11x11 pixels with weights from the candidates' own flattened
-// colour.
+//   colour.
 // - Candidates are mixed in proportion to 1 / MSE^2 instead of taking the best one: a sixth less error on average.
 #pragma once
 
