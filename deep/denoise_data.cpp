@@ -148,7 +148,10 @@ void readComponent(const DeepImage& image, const DenoiseInputs& inputs, const st
       std::array<float, 3> value{};
       for (size_t c = 0; c < 3 && w > 0; ++c) {
         float v = colour[h][c][b] * inverse;
-        if (component.perAlbedo) v /= std::max(albedo[h][c][b] * inverse, 0.0f) + kAlbedoOffset;
+        if (component.perAlbedo) {
+          const float a = albedo[h][c][b] * inverse;  // what cannot be used counts as 0, as in readFeature
+          v /= (a > 0 && usable(a) ? a : 0) + kAlbedoOffset;
+        }
         value[c] = v;
       }
       if (!usable(value[0]) || !usable(value[1]) || !usable(value[2])) {

@@ -292,6 +292,18 @@ TEST(Denoise, NonFiniteColoursAreCountedAndFilled) {
       }
 }
 
+TEST(Denoise, ANonFiniteAlbedoLeavesTheColour) {
+  const RenderedFrame frame = renderFrame();
+  for (const float value : {kNan, kInfinity, -kInfinity, 1e30f}) {
+    DeepImage image = frame.noisy.copy();
+    const size_t bin = binAt(image, 20, 21);
+    poison(image, "albedo half0.albedo half1.albedo", bin, value);
+    const DeepImage out = run(image, {.gate = false});
+    for (const std::string& rgb : kRgb)
+      EXPECT_NEAR(out.get(rgb)[bin], frame.noisy.get(rgb)[bin], 0.5f * frame.noisy.get(rgb)[bin]) << value;
+  }
+}
+
 TEST(Denoise, ANonFiniteEmissionBecomesNothing) {
   DeepImage image = renderFrame({.emission = true}).noisy;
   const size_t bin = binAt(image, 21, 21);
