@@ -5,8 +5,6 @@
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfTileDescription.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_pipeline.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstring>
@@ -15,6 +13,7 @@
 #include "deep/exr_codec.h"
 #include "deep/exr_output.h"
 #include "flat/error.h"
+#include "flat/parallel_in_order.h"
 
 namespace fathom::deep {
 
@@ -134,19 +133,11 @@ struct Writer::Impl {
   }
 
   void writeChunks(const Sources& sources, int lastRow) {
-    using Packed = std::pair<size_t, Bytes>;
     const size_t last = size_t(lastRow) * size_t(grid.columns());
-    const auto number = [&](tbb::flow_control& control) {
-      if (nextChunk < last) return nextChunk++;
-      control.stop();
-      return last;
-    };
-    const auto pack = [&](size_t chunk) { return Packed(chunk, packChunk(sources, chunk)); };
-    const auto append = [&](const Packed& chunk) { output.append(chunk.first, chunk.second); };
-    tbb::parallel_pipeline(2 * size_t(tbb::this_task_arena::max_concurrency()),
-                           tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order, number) &
-                               tbb::make_filter<size_t, Packed>(tbb::filter_mode::parallel, pack) &
-                               tbb::make_filter<Packed, void>(tbb::filter_mode::serial_in_order, append));
+    parallelInOrder(
+        nextChunk, last, [&](size_t chunk) { return packChunk(sources, chunk); },
+        [&](size_t chunk, const Bytes& bytes) { output.append(chunk, bytes); });
+    nextChunk = last;
   }
 
   struct Scratch {
