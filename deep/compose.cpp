@@ -69,7 +69,7 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
         bool finite = true;
         for (size_t c = 0; c < 3; ++c) {
           float sum = 0;
-          for (size_t i = 0; i < data.components.size(); ++i) {
+          for (size_t i = 0; i < data.components.size() && !still[pixel]; ++i) {
             float& v = filtered[i][3 * b + c];
             if (data.components[i].perAlbedo) v *= data.albedo.value[c][b] + kAlbedoOffset;
             sum += v;

@@ -53,8 +53,10 @@ void prefilterFeatures(DenoiseData& data, const Activity& activity, int reach) {
   packBlock(data, data.normal, 1, packed);
   const Feature& first = data.albedo.value.empty() ? data.normal : data.albedo;
   const Feature& second = data.normal.value.empty() ? data.albedo : data.normal;
-  const FeatureGuide guides[2] = {featureGuide(data, first, pad), featureGuide(data, second, pad)};
-  const std::vector<Buffer<float>> gradient = squaredGradients(data, data.depth);
+  const Buffer<uint8_t> unread = allWithin(activity.still, data.width, data.height, reach);
+  const Buffer<uint8_t> unseen = allWithin(unread, data.width, data.height, pad);
+  const FeatureGuide guides[2] = {featureGuide(data, first, pad, unseen), featureGuide(data, second, pad, unseen)};
+  const std::vector<Buffer<float>> gradient = squaredGradients(data, data.depth, unread);
 
   JointFilterInput input;
   input.width = data.width;

@@ -52,9 +52,9 @@ struct FeatureInput {
   std::vector<Buffer<float>> gradients;
   std::vector<FeatureChannel> channels;
 
-  explicit FeatureInput(const DenoiseData& data) {
+  FeatureInput(const DenoiseData& data, const Buffer<uint8_t>& still) {
     for (const Feature* feature : {&data.albedo, &data.normal, &data.depth}) {
-      std::vector<Buffer<float>> gradient = squaredGradients(data, *feature);
+      std::vector<Buffer<float>> gradient = squaredGradients(data, *feature, still);
       for (size_t c = 0; c < gradient.size(); ++c) {
         channels.push_back({feature->value[c].data(), feature->variance[c].data(), gradient[c].data()});
         gradients.push_back(std::move(gradient[c]));
@@ -78,9 +78,12 @@ std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& featu
   const auto active = [&](const Box& tile) { return activeComponents(data, activity, tile, pass.radius); };
   const auto consume = [&](const FilterTile& tile) {
     int c = 0;
-    for (size_t i = 0; i < data.components.size(); ++i)
+    for (size_t i = 0; i < data.components.size(); ++i) {
       if (tile.active >> i & 1)
         addCandidates(data, data.components[i], guides[i].variance, tile, c++, activity.still, candidates[i]);
+      else if (tile.active != 0)
+        addDarkness(data, tile.box, candidates[i]);
+    }
     count.add(tile);
   };
   jointFilter(input, pass, active, consume);
@@ -141,7 +144,7 @@ std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan) {
 std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
                                          const Activity& activity, std::span<const JointFilterParams> passes,
                                          float level, const Progress& progress, FilterCounts& counts) {
-  const FeatureInput features(data);
+  const FeatureInput features(data, activity.still);
   std::vector<Buffer<float>> result;
   double cost = 0, done = 0;  // in candidate pixels of the windows
   const auto costOf = [](const JointFilterParams& pass) { return double(2 * pass.radius + 1) * (2 * pass.radius + 1); };
@@ -158,8 +161,8 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
     }
     addPass(blends, result);
   }
-  for (Buffer<float>& values : result)
-    for (float& value : values) value /= float(passes.size());
+  for (size_t c = 0; c < result.size() && passes.size() > 1; ++c)
+    for (float& value : result[c]) value /= float(passes.size());
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "deep/still.h"
 #include "flat/parallel.h"
 
 namespace fathom::deep {
@@ -60,16 +61,34 @@ void flattenBlock(const DenoiseData& data, const float* values, int block, Guide
   });
 }
 
-// Sums of weight^2 times the bins' variance.
+// The sum of weight^2 times the bins' variance.
+float varianceOfPixel(const DenoiseData& data, const Buffer<float>& variance, size_t pixel) {
+  float sum = 0;
+  for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
+    sum += data.weight[b] * data.weight[b] * variance[b];
+  return sum;
+}
+
 void flattenVariance(const DenoiseData& data, const Buffer<float>& variance, flat::Padded& out) {
   parallelFor(0, data.height, [&](int y) {
-    const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
-    for (int x = 0; x < data.width; ++x) {
-      float sum = 0;
-      for (uint64_t b = offsets[x]; b < offsets[x + 1]; ++b) sum += data.weight[b] * data.weight[b] * variance[b];
-      out.row(y)[x] = sum;
-    }
+    const size_t row = size_t(y) * size_t(data.width);
+    for (int x = 0; x < data.width; ++x) out.row(y)[x] = varianceOfPixel(data, variance, row + size_t(x));
   });
+}
+
+// The mean of a feature over a pixel's bins, and their alpha; 0 and 0 where there is none.
+struct Mean {
+  float value = 0, weight = 0;
+};
+
+Mean flattenPixel(const DenoiseData& data, const Buffer<float>& values, size_t pixel) {
+  Mean mean;
+  for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
+    mean.value += data.weight[b] * values[b];
+    mean.weight += data.weight[b];
+  }
+  mean.value = mean.weight > 0 ? mean.value / mean.weight : 0;
+  return mean;
 }
 
 }  // namespace
@@ -127,54 +146,54 @@ ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& comp
   return guide;
 }
 
-FeatureGuide featureGuide(const DenoiseData& data, const Feature& feature, int pad) {
+FeatureGuide featureGuide(const DenoiseData& data, const Feature& feature, int pad, const Buffer<uint8_t>& skip) {
   FeatureGuide guide;
   for (size_t c = 0; c < 3; ++c) {
-    guide.value.value[c] = flat::Padded(data.width, data.height, pad);
-    guide.variance.value[c] = flat::Padded(data.width, data.height, pad);
     const size_t from = std::min(c, feature.value.size() - 1);
-    flattenVariance(data, feature.variance[from], guide.variance.value[c]);
+    flat::Padded& value = guide.value.value[c] = flat::Padded(data.width, data.height, pad);
+    flat::Padded& variance = guide.variance.value[c] = flat::Padded(data.width, data.height, pad);
     parallelFor(0, data.height, [&](int y) {
-      const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
+      const size_t row = size_t(y) * size_t(data.width);
       for (int x = 0; x < data.width; ++x) {
-        float sum = 0, weight = 0;
-        for (uint64_t b = offsets[x]; b < offsets[x + 1]; ++b) {
-          sum += data.weight[b] * feature.value[from][b];
-          weight += data.weight[b];
-        }
-        guide.value.value[c].row(y)[x] = weight > 0 ? sum / weight : 0;
-        if (weight > 0) guide.variance.value[c].row(y)[x] /= weight * weight;
+        const size_t pixel = row + size_t(x);
+        const Mean mean = skip[pixel] ? Mean() : flattenPixel(data, feature.value[from], pixel);
+        value.row(y)[x] = mean.value;
+        variance.row(y)[x] =
+            mean.weight > 0 ? varianceOfPixel(data, feature.variance[from], pixel) / (mean.weight * mean.weight) : 0;
       }
     });
-    guide.value.value[c].extend();
-    guide.variance.value[c].extend();
+    value.extend();
+    variance.extend();
   }
   return guide;
 }
 
-std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Feature& feature) {
+std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Feature& feature,
+                                            const Buffer<uint8_t>& skip) {
   std::vector<Buffer<float>> result;
-  if (feature.value.empty()) return result;
-  const FeatureGuide guide = featureGuide(data, feature, 1);
-  flat::Padded weight(data.width, data.height, 1);
-  parallelFor(0, data.height, [&](int y) {
-    const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
-    for (int x = 0; x < data.width; ++x)
-      weight.row(y)[x] = std::accumulate(data.weight.data() + offsets[x], data.weight.data() + offsets[x + 1], 0.0f);
-  });
-  weight.extend();
-  for (size_t c = 0; c < feature.value.size(); ++c) {
-    const flat::Padded& value = guide.value.value[c];
+  const Buffer<uint8_t> unread = allWithin(skip, data.width, data.height, 1);
+  flat::Padded value(data.width, data.height, 1), weight(data.width, data.height, 1);
+  for (const Buffer<float>& channel : feature.value) {
+    parallelFor(0, data.height, [&](int y) {
+      const size_t row = size_t(y) * size_t(data.width);
+      for (int x = 0; x < data.width; ++x) {
+        const Mean mean = unread[row + size_t(x)] ? Mean() : flattenPixel(data, channel, row + size_t(x));
+        value.row(y)[x] = mean.value;
+        weight.row(y)[x] = mean.weight;
+      }
+    });
+    value.extend();
+    weight.extend();
     Buffer<float>& gradient = result.emplace_back(size_t(data.width) * size_t(data.height));
     parallelFor(0, data.height, [&](int y) {
-      float* out = gradient.data() + size_t(y) * size_t(data.width);
+      const size_t row = size_t(y) * size_t(data.width);
       for (int x = 0; x < data.width; ++x) {
         // A pixel that sees nothing has no value: the feature is taken to go on as it is.
         const auto at = [&](int dx, int dy) {
           return weight.row(y + dy)[x + dx] > 0 ? value.row(y + dy)[x + dx] : value.row(y)[x];
         };
         const float gx = 0.5f * (at(1, 0) - at(-1, 0)), gy = 0.5f * (at(0, 1) - at(0, -1));
-        out[x] = gx * gx + gy * gy;
+        gradient[row + size_t(x)] = skip[row + size_t(x)] ? 0 : gx * gx + gy * gy;
       }
     });
   }

@@ -25,14 +25,16 @@ ComponentGuide colourGuide(const DenoiseData& data, const DenoiseComponent& comp
 // less error.
 void prefilterVariance(flat::Padded& variance, int width, int height);
 
-// The flattened mean of a feature (over the pixel's alpha) and its variance, padded.
+// The flattened mean of a feature (over the pixel's alpha) and its variance, padded; 0 where skip[pixel] != 0.
 struct FeatureGuide {
   Guide value;
   GuideVariance variance;
 };
-FeatureGuide featureGuide(const DenoiseData& data, const Feature& feature, int pad);
+FeatureGuide featureGuide(const DenoiseData& data, const Feature& feature, int pad, const Buffer<uint8_t>& skip);
 
-// Per channel of the feature and pixel: the squared magnitude of the gradient of the flattened feature.
-std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Feature& feature);
+// Per channel of the feature and pixel: the squared magnitude of the gradient of the flattened feature; 0
+// where skip[pixel] != 0.
+std::vector<Buffer<float>> squaredGradients(const DenoiseData& data, const Feature& feature,
+                                            const Buffer<uint8_t>& skip);
 
 }  // namespace fathom::deep

@@ -50,6 +50,7 @@ void fillFromOthers(const FilterTile& tile, size_t i, int c, size_t bin, std::ve
 // Adds one bin of one candidate; `in` is the bin's noisy data.
 void addBin(const float* in, const float* sums, const float* own, float weight, PixelHalves& pixel, float* out) {
   std::array<Rgb, 2> f;
+  std::fill_n(out, 3, 0.0f);
   if (!filteredHalves(sums, f)) return;
   pixel.alpha += weight;
   for (size_t c = 0; c < 3; ++c) out[c] = 0.5f * (f[0][c] + f[1][c]);
@@ -165,7 +166,7 @@ Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) 
     return plane;
   };
   for (int k = 0; k < candidates; ++k) {
-    value.emplace_back(data.bins() * 3, 0.0f);
+    value.emplace_back(data.bins() * 3);
     error.push_back(zeros());
     if (!wantPilot) continue;
     std::array<Guide, 2>& guides = halves.emplace_back();
@@ -202,6 +203,14 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
   }
 }
 
+void addDarkness(const DenoiseData& data, const Box& tile, Candidates& candidates) {
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    const uint64_t* row = data.offsets + size_t(y) * size_t(data.width);
+    for (Buffer<float>& value : candidates.value)
+      std::fill(value.data() + 3 * row[tile.x0], value.data() + 3 * row[tile.x1], 0.0f);
+  }
+}
+
 Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Candidates candidates, float level,
                       int pad) {
   for (flat::Padded& plane : candidates.error) plane.extend();
@@ -220,6 +229,7 @@ Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Can
   parallelFor(0, data.height, [&](int y) {
     const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
     for (int x = 0; x < data.width; ++x) {
+      if (still[size_t(y) * size_t(data.width) + size_t(x)]) continue;
       for (size_t b = size_t(offsets[x]); b < size_t(offsets[x + 1]); ++b) {
         for (size_t c = 0; c < 3; ++c) {
           float sum = 0;

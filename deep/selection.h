@@ -22,7 +22,7 @@ inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
 
 // What a filter bank made of one component.
 struct Candidates {
-  std::vector<Buffer<float>> value;  // [candidate], per bin 3
+  std::vector<Buffer<float>> value;  // [candidate], per bin 3; still pixels' are never set nor read
   // [candidate], per pixel: estimated squared error of the flattened value, R + G + B; unbiased, so negative at times.
   std::vector<flat::Padded> error;
   std::vector<flat::Padded> flattened;       // [channel], per pixel: the mean of the candidates
@@ -35,6 +35,9 @@ struct Candidates {
 // at 0. `variance`: of the flattened component, used where there are no halves.
 void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
                    const FilterTile& tile, int c, const Buffer<uint8_t>& still, Candidates& candidates);
+
+// The same for a tile where the component has no light: values are 0.
+void addDarkness(const DenoiseData& data, const Box& tile, Candidates& candidates);
 
 struct Blend {
   Buffer<float> value;  // per bin 3

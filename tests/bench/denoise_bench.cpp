@@ -63,7 +63,7 @@ std::vector<std::map<std::string, double>> stageMedians(const std::vector<Case>&
       double total = 0;
       for (const auto& [stage, value] : stats.seconds) {
         seconds[i][stage].push_back(value);
-        total += value;
+        if (stage.find("saved") == std::string::npos) total += value;
       }
       seconds[i]["total"].push_back(total);
     });
