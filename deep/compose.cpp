@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "deep/still.h"
 #include "flat/parallel.h"
 
 namespace fathom::deep {
@@ -56,6 +57,7 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
                         const Buffer<uint8_t>& still, std::span<const std::array<Buffer<float>, 3>> ofPixels,
                         std::span<Buffer<float>> filtered) {
   Buffer<GateBin> bins(data.bins());
+  const Buffer<uint8_t> unread = allWithin(still, data.width, data.height, kGateRadius);
   const std::span<const float> alpha = image.get("A");
   const std::array<std::span<const float>, 3> noisy{image.get("R"), image.get("G"), image.get("B")};
   std::array<std::span<const float>, 3> variance;
@@ -64,6 +66,7 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
   parallelFor(0, data.height, [&](int y) {
     for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel) {
       for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
+        if (unread[pixel]) continue;
         GateBin& bin = bins[b] = {};
         const float inverse = alpha[b] > 0 ? 1 / std::min(alpha[b], 1.0f) : 0;
         bool finite = true;

@@ -18,7 +18,7 @@ std::vector<std::array<Buffer<float>, 3>> pixelVariance(const DenoiseData& data,
                                                         const DenoiseInputs& inputs);
 
 // Multiplies the albedo back into `filtered` (per component 3 values per bin) and fills what the gate needs of each
-// bin, with the noisy colours from `image`. `ofPixels`: pixelVariance's.
+// bin, with the noisy colours from `image`; bins that only still pixels see are not set. `ofPixels`: pixelVariance's.
 Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const DenoiseInputs& inputs,
                         const Buffer<uint8_t>& still, std::span<const std::array<Buffer<float>, 3>> ofPixels,
                         std::span<Buffer<float>> filtered);

@@ -63,6 +63,7 @@ void prefilterFeatures(DenoiseData& data, const Activity& activity, int reach) {
   input.height = data.height;
   input.rowPhase = data.rowPhase;
   input.offsets = data.offsets;
+  input.skip = unread.data();
   input.features = {{data.depth.value[0].data(), data.depth.variance[0].data(), gradient[0].data()}};
   input.components = {
       {packed.data(), {&guides[0].value, &guides[1].value}, {&guides[0].variance, &guides[1].variance}}};

@@ -67,7 +67,8 @@ struct FeatureInput {
 std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& features,
                               std::span<const ComponentGuide> guides, const Activity& activity,
                               const JointFilterParams& pass, float level, int pilotPad, TileCount& count) {
-  JointFilterInput input{data.width, data.height, data.rowPhase, data.offsets, features.channels, {}};
+  JointFilterInput input{data.width,        data.height, data.rowPhase,        data.offsets,
+                         features.channels, {},          activity.still.data()};
   std::vector<Candidates> candidates;
   for (size_t c = 0; c < data.components.size(); ++c) {
     const ComponentGuide& guide = guides[c];

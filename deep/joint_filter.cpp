@@ -256,7 +256,7 @@ void SumRow(const JointFilterInput& in, const JointFilterParams& params, const s
       const size_t begin = size_t(in.offsets[pixel]), end = size_t(in.offsets[pixel + 1]);
       const size_t here = local;
       local += end - begin;
-      if (!inside || begin == end) continue;
+      if (!inside || begin == end || (in.skip && in.skip[pixel])) continue;
       const int x0 = std::max(0, x - R), x1 = std::min(in.width - 1, x + R);
       const uint64_t* offsets = in.offsets + size_t(yq) * width + size_t(x0);
       const size_t pixels = size_t(x1 - x0 + 1);

@@ -67,6 +67,7 @@ struct JointFilterInput {
   std::vector<FeatureChannel>
       features;  // any number of features of three channels up to two, then one of a single channel
   std::vector<FilterComponent> components;  // 1 or 2
+  const uint8_t* skip = nullptr;            // per pixel, or none: where it is not 0 the sums stay 0
 };
 
 // The sums of one tile. For the i-th bin of the tile (rows in order), component c and candidate k, at(i, c, k) is 8

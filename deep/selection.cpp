@@ -1,5 +1,6 @@
 #include "deep/selection.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "deep/still.h"
@@ -93,7 +94,7 @@ float squaredErrorOfWhole(const PixelHalves& pixel, const GuideVariance& varianc
 }
 
 // Gaussian of kBlendSigma, separable, in place.
-void blur(const DenoiseData& data, flat::Padded& plane) {
+void blur(const DenoiseData& data, std::span<const uint8_t> wantedRows, flat::Padded& plane) {
   std::array<float, 2 * kBlendRadius + 1> kernel;
   float sum = 0;
   for (int i = -kBlendRadius; i <= kBlendRadius; ++i) {
@@ -105,21 +106,28 @@ void blur(const DenoiseData& data, flat::Padded& plane) {
   flat::Padded across(data.width, data.height, kBlendRadius);
   parallelFor(0, data.height, [&](int y) {
     std::fill_n(across.row(y), data.width, 0.0f);
+    if (!wantedRows[size_t(y)]) return;
     for (int i = -kBlendRadius; i <= kBlendRadius; ++i)
       for (int x = 0; x < data.width; ++x) across.row(y)[x] += kernel[size_t(i + kBlendRadius)] * plane.row(y)[x + i];
   });
   across.extend();
   parallelFor(0, data.height, [&](int y) {
     std::fill_n(plane.row(y), data.width, 0.0f);
+    if (!wantedRows[size_t(y)]) return;
     for (int i = -kBlendRadius; i <= kBlendRadius; ++i)
       for (int x = 0; x < data.width; ++x) plane.row(y)[x] += kernel[size_t(i + kBlendRadius)] * across.row(y + i)[x];
   });
 }
 
 // Replaces errors by the candidates' parts of the blend, which sum to one.
-void blendWeights(const DenoiseData& data, float level, std::vector<flat::Padded>& error) {
+void blendWeights(const DenoiseData& data, const Buffer<uint8_t>& wanted, float level,
+                  std::vector<flat::Padded>& error) {
   const float least = 1e-12f * level * level;
+  std::vector<uint8_t> rows(size_t(data.height));
   parallelFor(0, data.height, [&](int y) {
+    const uint8_t* row = wanted.data() + size_t(y) * size_t(data.width);
+    rows[size_t(y)] = std::any_of(row, row + data.width, [](uint8_t w) { return w != 0; });
+    if (!rows[size_t(y)]) return;
     for (int x = 0; x < data.width; ++x) {
       float worst = 0, sum = 0;
       for (const flat::Padded& e : error) worst = std::max(worst, e.row(y)[x]);
@@ -130,7 +138,7 @@ void blendWeights(const DenoiseData& data, float level, std::vector<flat::Padded
       for (flat::Padded& e : error) e.row(y)[x] /= sum;
     }
   });
-  for (flat::Padded& e : error) blur(data, e);
+  for (flat::Padded& e : error) blur(data, rows, e);
 }
 
 // The flattened halves blended, and the variance of each from their difference.
@@ -225,7 +233,7 @@ Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Can
   Buffer<uint8_t> wanted = allWithin(still, data.width, data.height, kBlendRadius);
   for (uint8_t& w : wanted) w = !w;
   flat::bilateral(data.width, data.height, params, wanted, candidates.flattened, candidates.error, smooth);
-  blendWeights(data, level, smooth);
+  blendWeights(data, wanted, level, smooth);
   parallelFor(0, data.height, [&](int y) {
     const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
     for (int x = 0; x < data.width; ++x) {
