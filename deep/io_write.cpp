@@ -184,6 +184,7 @@ struct Writer::Impl {
       sums[x] = uint32_t(offsets[x + 1] - first);
       local.most = std::max(local.most, uint32_t(offsets[x + 1] - offsets[x]));
     }
+    if (n == 0) return;
     for (const ChannelInfo& c : channels) {
       const Channel& channel = *image.find(c.name);
       uint8_t* to = grow(local.samples, n * (valueBytes(c.type)));
