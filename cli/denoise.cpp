@@ -240,7 +240,8 @@ void addDenoise(CLI::App& app) {
   option("--flat", command->flattened, "OUT2", "Also write the flattened result");
   sub->add_flag("--components", command->components,
                 "Also write diffuse and specular each to a file beside OUT (which holds both as channels)");
-  option("--quality", command->quality, "fast|balanced|best", "best takes about four times as long as balanced")
+  option("--quality", command->quality, "fast|balanced|best",
+         "fast takes three quarters of the time of balanced, best two and a half times as much")
       ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
       ->default_str(command->quality);
   sub->add_flag("--no-gate", command->noGate, "The published filter alone, which lets some light bleed between bins");

@@ -78,7 +78,7 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
             sum += v;
           }
           const float y0 = noisy[c][b] * inverse;
-          finite = finite && std::fabs(y0) <= kLargest;
+          finite = finite && isFinite(y0);
           bin.filtered[c] = still[pixel] ? y0 : sum;
           bin.residual[c] = y0 - bin.filtered[c];
           bin.variance[c] = sampleVariance(data, variance, ofPixels, pixel, b, c);
@@ -105,8 +105,8 @@ void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_
         for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
           if (!(data.weight[b] > 0)) {
             for (std::span<float>& values : part)
-              if (!(std::fabs(values[b]) <= kLargest)) values[b] = 0;
-            if (!(std::fabs(whole[b]) <= kLargest)) whole[b] = 0;
+              if (!isFinite(values[b])) values[b] = 0;
+            if (!isFinite(whole[b])) whole[b] = 0;
             continue;
           }
           if (still[pixel]) continue;
@@ -114,7 +114,7 @@ void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_
           for (size_t i = 0; i < part.size(); ++i) {
             const float f = filtered[i][3 * b + c] * std::min(alpha[b], 1.0f);
             float& value = part[i][b];
-            value = gate[b] > 0 && std::fabs(value) <= kLargest ? f + gate[b] * (value - f) : f;
+            value = gate[b] > 0 && isFinite(value) ? f + gate[b] * (value - f) : f;
             sum += value;
           }
           whole[b] = sum;

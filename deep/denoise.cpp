@@ -84,8 +84,7 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   DenoiseStats& stats = statsOut ? *statsOut : unwanted;
   Clock clock(stats);
   progress.at(0);
-  DenoiseData data = prepareDenoise(image, plan.inputs);
-  dropStatistics(image, plan.params, false);
+  DenoiseData data = prepareColours(image, plan.inputs);
   clock.lap("prepare");
   const std::vector<JointFilterParams> passes = filterPasses(plan);
   std::vector<ComponentGuide> guides;
@@ -98,6 +97,9 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   progress.at(0.05);
   int reach = 0;  // of the bank's windows, and a pixel more for gradients
   for (const JointFilterParams& pass : passes) reach = std::max(reach, pass.radius + 1);
+  prepareFeatures(image, plan.inputs, allWithin(activity.still, data.width, data.height, featureReach(reach)), data);
+  dropStatistics(image, plan.params, false);
+  clock.lap("prepare");
   prefilterFeatures(data, activity, reach);
   clock.lap("prefilter");
   progress.at(0.15);
@@ -128,7 +130,7 @@ float meanLevel(const DeepImage& image) {
   for (const char* name : kRgb) {
     const flat::Plane& plane = flattened.get(name);
     for (size_t i = 0; i < plane.values.size(); ++i) {
-      if (!(alpha.values[i] > 0) || !(std::fabs(plane.values[i]) <= kLargest)) continue;
+      if (!(alpha.values[i] > 0) || !isFinite(plane.values[i])) continue;
       sum += double(plane.values[i]);
       ++count;
     }

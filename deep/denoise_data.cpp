@@ -31,10 +31,6 @@ Colour colourOf(const DeepImage& image, const std::string& group, const std::arr
   return {image.get(group + names[0]), image.get(group + names[1]), image.get(group + names[2])};
 }
 
-bool usable(float value) {
-  return std::fabs(value) <= kLargest;
-}  // false for NaN
-
 // alpha^-1, or 0 where there is no alpha: such a sample has no say.
 float unpremultiply(float alpha) {
   return alpha > 0 ? 1 / std::min(alpha, 1.0f) : 0;
@@ -49,12 +45,23 @@ void fillCounts(const DeepImage& image, const DenoiseInputs& inputs, DenoiseData
   const float spp = float(inputs.spp > 0 ? inputs.spp : kAssumedSpp);
   forBins(data, [&](size_t b) {
     const float n = samples.empty() ? data.weight[b] * spp : samples[b];
-    data.count[b] = n > 0 && usable(n) ? n : 0;
+    data.count[b] = n > 0 && isFinite(n) ? n : 0;
+  });
+}
+
+// The same for the bins of pixels that are not skipped.
+template <class Body>
+void forBins(const DenoiseData& data, const Buffer<uint8_t>& skip, const Body& body) {
+  parallelRanges(0, data.height, kRowsAtOnce, [&](int y0, int y1) {
+    const size_t width = size_t(data.width);
+    for (size_t pixel = size_t(y0) * width; pixel < size_t(y1) * width; ++pixel)
+      for (size_t bin = size_t(data.offsets[pixel]); bin < size_t(data.offsets[pixel + 1]) && !skip[pixel]; ++bin)
+        body(bin);
   });
 }
 
 Feature readFeature(const DeepImage& image, const std::string& group, const std::array<const char*, 3>& names,
-                    bool variance, const DenoiseData& data) {
+                    bool variance, const Buffer<uint8_t>& skip, const DenoiseData& data) {
   Feature feature;
   const std::span<const float> alpha = image.get("A");
   for (const char* name : names) {
@@ -62,10 +69,10 @@ Feature readFeature(const DeepImage& image, const std::string& group, const std:
     const std::span<const float> var = variance ? image.get("variance." + group + name) : std::span<const float>();
     Buffer<float>& value = feature.value.emplace_back(data.bins());
     Buffer<float>& noise = feature.variance.emplace_back(data.bins());
-    forBins(data, [&](size_t b) {
+    forBins(data, skip, [&](size_t b) {
       const float v = in[b] * unpremultiply(alpha[b]);
-      value[b] = usable(v) ? v : 0;
-      noise[b] = !var.empty() && var[b] > 0 && usable(var[b]) ? var[b] : 0;
+      value[b] = isFinite(v) ? v : 0;
+      noise[b] = !var.empty() && var[b] > 0 && isFinite(var[b]) ? var[b] : 0;
     });
   }
   return feature;
@@ -73,18 +80,19 @@ Feature readFeature(const DeepImage& image, const std::string& group, const std:
 
 // The logarithm makes depth a ratio: no unit, no overflow. A volume is its middle; its extent adds the variance of a
 // uniform.
-Feature readDepth(const DeepImage& image, const DenoiseInputs& inputs, const DenoiseData& data) {
+Feature readDepth(const DeepImage& image, const DenoiseInputs& inputs, const Buffer<uint8_t>& skip,
+                  const DenoiseData& data) {
   Feature feature;
   const std::span<const float> z = image.get("Z");
   const std::span<const float> back = inputs.volumes ? image.get("ZBack") : std::span<const float>();
   const std::span<const float> var = inputs.depthVariance ? image.get("variance.Z") : std::span<const float>();
   Buffer<float>& value = feature.value.emplace_back(data.bins());
   Buffer<float>& noise = feature.variance.emplace_back(data.bins());
-  forBins(data, [&](size_t b) {
+  forBins(data, skip, [&](size_t b) {
     const double front = std::isnan(z[b]) ? 1.0 : std::clamp(double(z[b]), 1e-30, 1e30);
     const double end = !back.empty() && back[b] > z[b] ? std::min(double(back[b]), 1e30) : front;
     const double middle = 0.5 * (front + end), extent = end - front;
-    const double v = !var.empty() && var[b] > 0 && usable(var[b]) ? double(var[b]) : 0.0;
+    const double v = !var.empty() && var[b] > 0 && isFinite(var[b]) ? double(var[b]) : 0.0;
     value[b] = float(std::log(middle));
     noise[b] = float(std::min((v + extent * extent / 12) / (middle * middle), 1e6));
   });
@@ -95,7 +103,7 @@ Feature readDepth(const DeepImage& image, const DenoiseInputs& inputs, const Den
 std::array<float, 2> halfWeights(float weight, std::span<const float> n0, std::span<const float> n1, size_t b) {
   if (n0.empty()) return {weight, weight};
   const float a = std::max(n0[b], 0.0f), c = std::max(n1[b], 0.0f);
-  if (!(a + c > 0) || !usable(a + c)) return {0, 0};
+  if (!(a + c > 0) || !isFinite(a + c)) return {0, 0};
   return {weight * 2 * a / (a + c), weight * 2 * c / (a + c)};
 }
 
@@ -115,10 +123,10 @@ std::vector<Buffer<float>> componentVariance(const DeepImage& image, const Denoi
       float scale = 1;
       if (!component.name.empty()) {
         const float light = whole[c][b] * unpremultiply(alpha[b]);
-        scale = light != 0 && usable(light) ? std::min(std::fabs(mean / light), 1e6f) : 0;
+        scale = light != 0 && isFinite(light) ? std::min(std::fabs(mean / light), 1e6f) : 0;
       }
       const float v = variance[b] * scale * scale;
-      out[b] = v > 0 && usable(v) ? v : 0;
+      out[b] = v > 0 && isFinite(v) ? v : 0;
     });
   }
   return result;
@@ -150,11 +158,11 @@ void readComponent(const DeepImage& image, const DenoiseInputs& inputs, const st
         float v = colour[h][c][b] * inverse;
         if (component.perAlbedo) {
           const float a = albedo[h][c][b] * inverse;  // what cannot be used counts as 0, as in readFeature
-          v /= (a > 0 && usable(a) ? a : 0) + kAlbedoOffset;
+          v /= (a > 0 && isFinite(a) ? a : 0) + kAlbedoOffset;
         }
         value[c] = v;
       }
-      if (!usable(value[0]) || !usable(value[1]) || !usable(value[2])) {
+      if (!isFinite(value[0]) || !isFinite(value[1]) || !isFinite(value[2])) {
         value = {};
         w = 0;
       }
@@ -182,14 +190,14 @@ Buffer<uint8_t> findNonFinite(const DeepImage& image, const DenoiseInputs& input
   Buffer<uint8_t> result(data.bins(), 0);
   forBins(data, [&](size_t b) {
     const float scale = data.weight[b] > 0 ? unpremultiply(alpha[b]) : 1;
-    for (const std::span<const float>& colour : colours) result[b] |= !usable(colour[b] * scale);
+    for (const std::span<const float>& colour : colours) result[b] |= !isFinite(colour[b] * scale);
   });
   return result;
 }
 
 }  // namespace
 
-DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs) {
+DenoiseData prepareColours(const DeepImage& image, const DenoiseInputs& inputs) {
   DenoiseData data;
   data.width = image.dataWindow.width();
   data.height = image.dataWindow.height();
@@ -205,10 +213,14 @@ DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs) 
   } else {
     readComponent(image, inputs, "", nonFinite, data);
   }
-  if (inputs.albedo) data.albedo = readFeature(image, "albedo.", kRgb, inputs.albedoVariance, data);
-  if (inputs.normal) data.normal = readFeature(image, "N.", kXyz, inputs.normalVariance, data);
-  data.depth = readDepth(image, inputs, data);
   return data;
+}
+
+void prepareFeatures(const DeepImage& image, const DenoiseInputs& inputs, const Buffer<uint8_t>& skip,
+                     DenoiseData& data) {
+  if (inputs.albedo) data.albedo = readFeature(image, "albedo.", kRgb, inputs.albedoVariance, skip, data);
+  if (inputs.normal) data.normal = readFeature(image, "N.", kXyz, inputs.normalVariance, skip, data);
+  data.depth = readDepth(image, inputs, skip, data);
 }
 
 }  // namespace fathom::deep

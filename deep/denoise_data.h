@@ -9,14 +9,12 @@
 #include "deep/denoise.h"
 #include "deep/joint_filter.h"
 #include "flat/buffer.h"
+#include "flat/finite.h"
 
 namespace fathom::deep {
 
 // Added to the albedo before the diffuse light is divided by it (section 5.2), and multiplied back with it.
 inline constexpr float kAlbedoOffset = 0.03f;
-
-// Colours of larger magnitude count as non-finite (DATA.md).
-inline constexpr float kLargest = 1e15f;
 
 // Bins with less effective alpha (emission, or behind something opaque) have no say and keep their colours: nothing of
 // them is seen, and what little is seen of their neighbours must not be taken for theirs.
@@ -49,8 +47,12 @@ struct DenoiseData {
   size_t bins() const { return size_t(offsets[size_t(width) * size_t(height)]); }
 };
 
-// Reads what the plan says is there; throws Error by the name of a channel that is missing. `image` must outlive the
-// result.
-DenoiseData prepareDenoise(const DeepImage& image, const DenoiseInputs& inputs);
+// Reads the colours, weights and counts that the plan says are there, no features yet; throws Error by the name of a
+// channel that is missing. `image` must outlive the result.
+DenoiseData prepareColours(const DeepImage& image, const DenoiseInputs& inputs);
+
+// Reads the features, but where skip[pixel] != 0: there they are never set nor read.
+void prepareFeatures(const DeepImage& image, const DenoiseInputs& inputs, const Buffer<uint8_t>& skip,
+                     DenoiseData& data);
 
 }  // namespace fathom::deep

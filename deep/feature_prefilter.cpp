@@ -20,14 +20,16 @@ JointFilterParams prefilterParams() {
   return params;
 }
 
-void packBlock(const DenoiseData& data, const Feature& feature, int block, Buffer<float>& out) {
+void packBlock(const DenoiseData& data, const Feature& feature, int block, const Buffer<uint8_t>& skip,
+               Buffer<float>& out) {
+  const size_t width = size_t(data.width);
   parallelFor(0, data.height, [&](int y) {
-    const size_t row = size_t(y) * size_t(data.width);
-    for (size_t b = size_t(data.offsets[row]); b < size_t(data.offsets[row + size_t(data.width)]); ++b) {
-      float* o = out.data() + 8 * b + 4 * block;
-      for (size_t c = 0; c < 3; ++c) o[c] = feature.value.empty() ? 0 : feature.value[c][b] * data.weight[b];
-      o[3] = feature.value.empty() ? 0 : data.weight[b];
-    }
+    for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel)
+      for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]) && !skip[pixel]; ++b) {
+        float* o = out.data() + 8 * b + 4 * block;
+        for (size_t c = 0; c < 3; ++c) o[c] = feature.value.empty() ? 0 : feature.value[c][b] * data.weight[b];
+        o[3] = feature.value.empty() ? 0 : data.weight[b];
+      }
   });
 }
 
@@ -48,13 +50,13 @@ void prefilterFeatures(DenoiseData& data, const Activity& activity, int reach) {
   if (data.albedo.value.empty() && data.normal.value.empty()) return;
   const JointFilterParams params = prefilterParams();
   const int pad = params.radius + params.patchRadius;
+  const Buffer<uint8_t> unread = allWithin(activity.still, data.width, data.height, reach);
+  const Buffer<uint8_t> unseen = allWithin(activity.still, data.width, data.height, featureReach(reach));
   Buffer<float> packed(data.bins() * 8);
-  packBlock(data, data.albedo, 0, packed);
-  packBlock(data, data.normal, 1, packed);
+  packBlock(data, data.albedo, 0, unseen, packed);
+  packBlock(data, data.normal, 1, unseen, packed);
   const Feature& first = data.albedo.value.empty() ? data.normal : data.albedo;
   const Feature& second = data.normal.value.empty() ? data.albedo : data.normal;
-  const Buffer<uint8_t> unread = allWithin(activity.still, data.width, data.height, reach);
-  const Buffer<uint8_t> unseen = allWithin(unread, data.width, data.height, pad);
   const FeatureGuide guides[2] = {featureGuide(data, first, pad, unseen), featureGuide(data, second, pad, unseen)};
   const std::vector<Buffer<float>> gradient = squaredGradients(data, data.depth, unread);
 

@@ -11,6 +11,11 @@ namespace fathom::deep {
 
 inline constexpr int kPrefilterRadius = 2, kPrefilterPatchRadius = 1;
 
+// How far from a bin that is to be filtered a feature is read; `reach`: of the colour filter's window and gradients.
+inline int featureReach(int reach) {
+  return reach + kPrefilterRadius + kPrefilterPatchRadius;
+}
+
 // Replaces albedo and normal, where the data has them, by filtered ones, and their variances by those of the filtered
 // means: the bin's own share of the weights times its variance, which is exact where the neighbours are as noisy and
 // weigh the same.

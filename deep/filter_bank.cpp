@@ -127,6 +127,7 @@ std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan) {
   first.kFeature = {0.7f, 2.0f, 0.7f};
   first.crossed = plan.inputs.halves;
   if (plan.params.quality == Quality::Fast) {
+    first.radius = 3;
     first.patchRadius = 1;
     first.candidates = 2;
     first.colourCandidates = 1;

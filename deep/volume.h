@@ -5,22 +5,15 @@
 // multiplied with.
 #pragma once
 
-#include <cmath>
 #include <span>
+
+#include "flat/finite.h"
 
 namespace fathom::deep {
 
 // What compositing makes of an alpha that a file may hold: NaN is 0, and the rest is brought into [0,1].
 inline double opacity(float alpha) {
   return alpha > 0 ? (alpha < 1 ? double(alpha) : 1.0) : 0.0;
-}
-
-// Whether a colour has a use: magnitudes above 1e15 count as non-finite. Compositing takes what has none for 0.
-inline bool isFinite(float value) {
-  return std::abs(value) <= 1e15f;
-}
-inline float finiteOrZero(float value) {
-  return isFinite(value) ? value : 0.0f;
 }
 
 // Depths as compositing takes them. A range that is not finite or not positive in length is a point at `z`; a depth

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "flat/error.h"
+#include "flat/finite.h"
 #include "flat/parallel.h"
 #include "flat/ssim.h"
 #include "flat/tonemap.h"
@@ -17,7 +18,6 @@ namespace fathom::flat {
 namespace {
 
 constexpr double kDark = 0.01;  // what keeps relative errors of black pixels finite
-constexpr float kLargest = 1e15f;
 constexpr std::array<const char*, 3> kColours = {"R", "G", "B"};
 
 double square(double x) {
@@ -38,7 +38,7 @@ struct Pair {
 
   bool finite(size_t i) const {
     for (size_t c = 0; c < 3; ++c)
-      if (!(std::abs(image[c][i]) <= kLargest && std::abs(reference[c][i]) <= kLargest)) return false;
+      if (!isFinite(image[c][i]) || !isFinite(reference[c][i])) return false;
     return true;
   }
 };

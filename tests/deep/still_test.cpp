@@ -27,7 +27,7 @@ Prepared prepare(DeepImage image, int radius) {
   std::vector<std::string> names;
   for (const Channel& channel : image.channels) names.push_back(channel.name);
   Prepared p{std::move(image), findDenoiseInputs(names, {}), {}, {}};
-  p.data = prepareDenoise(p.image, p.inputs);
+  p.data = prepareColours(p.image, p.inputs);
   std::vector<ComponentGuide> guides;
   for (const DenoiseComponent& component : p.data.components) guides.push_back(colourGuide(p.data, component, 7));
   p.activity = findActivity(p.data, guides, p.image, p.inputs, radius, kLevel);

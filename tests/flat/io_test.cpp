@@ -124,6 +124,16 @@ TEST(FlatIo, AttributesKeepTypeAndText) {
   EXPECT_EQ(read(folder / "b.exr").attributes, once.attributes);
 }
 
+TEST(FlatIo, NoFileTellsWhenItWasWritten) {
+  const TemporaryFolder folder;
+  write(folder / "a.exr", makeImage());
+  EXPECT_EQ(read(folder / "a.exr").attributes["DateTime"], "");
+  Image dated = makeImage();
+  dated.attributes["DateTime"] = "2026:01:02 03:04:05";
+  write(folder / "b.exr", dated);
+  EXPECT_EQ(read(folder / "b.exr").attributes["DateTime"], "2026:01:02 03:04:05");
+}
+
 TEST(FlatIo, NothingIsLeftWhereWritingFails) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "taken.exr");

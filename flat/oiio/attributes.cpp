@@ -1,4 +1,4 @@
-#include "flat/oiio_attributes.h"
+#include "flat/oiio/attributes.h"
 
 #include <optional>
 #include <string_view>
