@@ -1,0 +1,9 @@
+#include "cli/operation.h"
+
+namespace fathom::cli {
+
+void addAnalysisOperations(std::vector<OperationSpec>& table) {
+  (void)table;
+}
+
+}  // namespace fathom::cli

@@ -1,0 +1,156 @@
+// Operations that pass samples on, or decide which of them stay: merge, clip, crop, tidy, flatten.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+
+#include "cli/operation.h"
+#include "deep/channels.h"
+#include "deep/clip.h"
+#include "deep/flatten.h"
+#include "deep/ops/crop.h"
+#include "deep/ops/merge.h"
+#include "deep/tidy.h"
+
+namespace fathom::cli {
+
+namespace {
+
+Box unionOf(std::span<const Box> windows) {
+  Box all;
+  for (const Box& box : windows) {
+    if (box.empty()) continue;
+    if (all.empty()) all = box;
+    all = {std::min(all.x0, box.x0), std::min(all.y0, box.y0), std::max(all.x1, box.x1), std::max(all.y1, box.y1)};
+  }
+  return all.empty() ? windows[0] : all;
+}
+
+Operation makeMerge(const Arguments& arguments, std::span<const InputForm> inputs) {
+  std::vector<deep::DeepImage> forms;
+  for (const InputForm& input : inputs) forms.push_back(deepOf(input.image).copy());
+  const bool tidies = arguments.flag("tidy");
+  Operation operation;
+  operation.apply = [tidies](std::vector<AnyImage> images) -> AnyImage {
+    std::vector<deep::DeepImage> taken;
+    for (AnyImage& image : images) taken.push_back(std::move(deepOf(image)));
+    deep::DeepImage merged = deep::merge(taken);
+    if (!tidies) return merged;
+    deep::dropSampleStatistics(merged);
+    return deep::tidy(std::move(merged)).image;
+  };
+  operation.window = unionOf;
+  operation.summary = [lines = deep::describeMerge(forms)] { return lines; };
+  return operation;
+}
+
+Operation makeClip(const Arguments& arguments, std::span<const InputForm>) {
+  const float near = float(arguments.number("near")), far = float(arguments.number("far"));
+  return {.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::clip(deepOf(in[0]), near, far); }};
+}
+
+Operation makeCrop(const Arguments& arguments, std::span<const InputForm>) {
+  const Box box = arguments.box("box");
+  const bool outside = arguments.flag("outside");
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::crop(deepOf(in[0]), box, outside); };
+  operation.window = [=](std::span<const Box> windows) { return outside ? windows[0] : intersect(windows[0], box); };
+  return operation;
+}
+
+// What tidying found in the whole image and did to it.
+struct TidyCount {
+  std::mutex mutex;
+  deep::Untidiness untidiness;
+  bool scanned = false;
+  std::atomic<uint64_t> before = 0, after = 0;
+};
+
+Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
+  const auto count = std::make_shared<TidyCount>();
+  deep::DeepImage form = deepOf(inputs[0].image).copy();
+  const std::vector<std::string> statistics = deep::dropSampleStatistics(form);
+  Operation operation;
+  operation.scan = [count](const AnyImage& band) {
+    const deep::Untidiness found = deep::findUntidiness(deepOf(band));
+    const std::lock_guard lock(count->mutex);
+    count->untidiness |= found;
+  };
+  const auto merges = [count] { return count->untidiness.pointsCoincide || count->untidiness.volumesOverlap; };
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    deep::DeepImage& image = deepOf(in[0]);
+    count->before += image.samples();
+    if (merges()) deep::dropSampleStatistics(image);
+    if (count->untidiness.any()) image.attributes.erase("deepImageState");
+    deep::DeepImage result = deep::tidy(std::move(image)).image;
+    count->after += result.samples();
+    return result;
+  };
+  operation.summary = [=] {
+    std::vector<std::string> lines{fmt::format("{} samples, {} before{}", count->after.load(), count->before.load(),
+                                               count->untidiness.any() ? "" : ", was tidy")};
+    if (merges() && !statistics.empty()) lines.push_back("samples were merged or split, so these were dropped:");
+    for (const std::string& name : statistics)
+      if (merges()) lines.back() += " " + name;
+    return lines;
+  };
+  return operation;
+}
+
+Operation makeFlatten(const Arguments&, std::span<const InputForm>) {
+  const auto nonFinite = std::make_shared<std::atomic<uint64_t>>(0);
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    *nonFinite += deep::countNonFinite(deepOf(in[0]));
+    return deep::flatten(deepOf(in[0]));
+  };
+  operation.summary = [=]() -> std::vector<std::string> {
+    if (*nonFinite == 0) return {};
+    return {fmt::format("{} samples with values that are not finite: taken for 0", nonFinite->load())};
+  };
+  return operation;
+}
+
+}  // namespace
+
+void addSampleOperations(std::vector<OperationSpec>& table) {
+  using enum ImageKind;
+  using Type = ArgumentType;
+  table.push_back({"merge",
+                   "The samples of all images together, front to back.",
+                   {Deep, Deep},
+                   true,
+                   {{"tidy", Type::Flag, "0", "split volumes where they cross and merge what coincides"}},
+                   makeMerge});
+  table.push_back({"clip",
+                   "What lies between two depths, NEAR included, FAR not; a volume on the plane is cut.",
+                   {Deep},
+                   false,
+                   {{"near", Type::Number, "", "the nearest depth that stays", true},
+                    {"far", Type::Number, "", "the first depth that goes; inf for none", true}},
+                   makeClip});
+  table.push_back({"crop",
+                   "The pixels inside of a box, or all others.",
+                   {Deep},
+                   false,
+                   {{"box", Type::Box, "", "x,y,width,height in pixels of the image", true},
+                    {"outside", Type::Flag, "0", "keep what is outside of it"}},
+                   makeCrop});
+  table.push_back(
+      {"tidy",
+       "Sort samples front to back, split volumes that overlap others, and merge what then lies at the same "
+       "depth. The picture stays the same; compositing gets exact and fast.",
+       {Deep},
+       false,
+       {},
+       makeTidy});
+  table.push_back({"flatten",
+                   "Composite the samples into a flat image. Z becomes the mean depth of what is seen.",
+                   {Deep},
+                   false,
+                   {},
+                   makeFlatten});
+}
+
+}  // namespace fathom::cli
