@@ -19,7 +19,8 @@ namespace fathom::flat {
 
 namespace {
 
-constexpr double kRowsPerBlock = 32;  // readers hold whole blocks of rows, PIZ's being the tallest in common use
+constexpr double kRowsPerBlock =
+    256;  // readers hold whole blocks of rows: OpenImageIO that many, however few there are
 
 // What a reader of one part holds at least. In doubles, since windows may span all integers.
 double decodedBytes(const Imf::Header& header) {
