@@ -1,9 +1,87 @@
+// Operations that change values, and how many samples carry them: grade.
+#include <algorithm>
+#include <array>
+
 #include "cli/operation.h"
+#include "deep/ops/grade.h"
+#include "deep/ops/named_channels.h"
+#include "flat/error.h"
 
 namespace fathom::cli {
 
+namespace {
+
+std::string joined(std::string line, std::span<const std::string> names) {
+  for (const std::string& name : names) line.append(1, ' ').append(name);
+  return line;
+}
+
+// Names of `before` that `after` lacks, as a line for the user; none where nothing is missing.
+std::vector<std::string> describeDropped(const deep::DeepImage& before, const deep::DeepImage& after) {
+  std::vector<std::string> names;
+  for (const deep::Channel& channel : before.channels)
+    if (!after.find(channel.name)) names.push_back(channel.name);
+  if (names.empty()) return {};
+  return {joined("dropped, since they no longer describe the image:", names)};
+}
+
+// One number for all of R, G and B, or three.
+std::array<float, 3> perComponent(const Arguments& arguments, const std::string& name) {
+  const std::vector<double> numbers = arguments.numbers(name);
+  if (numbers.size() == 1) return {float(numbers[0]), float(numbers[0]), float(numbers[0])};
+  if (numbers.size() != 3) fail("grade: {}: expected one number or three, found {}", name, numbers.size());
+  return {float(numbers[0]), float(numbers[1]), float(numbers[2])};
+}
+
+bool isComponent(const std::string& channel) {
+  return channel.starts_with("diffuse.") || channel.starts_with("specular.");
+}
+
+Operation makeGrade(const Arguments& arguments, std::span<const InputForm> inputs) {
+  deep::GradeParams params;
+  params.channels = arguments.words("channels");
+  params.gain = perComponent(arguments, "gain");
+  params.offset = perComponent(arguments, "offset");
+  params.gamma = perComponent(arguments, "gamma");
+  params.saturation = float(arguments.number("saturation"));
+  params.near = float(arguments.number("near"));
+  params.far = float(arguments.number("far"));
+  params.nearWidth = float(arguments.number("nearsoft"));
+  params.farWidth = float(arguments.number("farsoft"));
+  const deep::DeepImage& form = deepOf(inputs[0].image);
+  const deep::DeepImage graded = deep::grade(form.copy(), params);
+  std::vector<std::string> lines = describeDropped(form, graded);
+  const auto changed = deep::channelsNamed("grade", params.channels, deep::floatChannels(form));
+  const bool components = std::ranges::any_of(deep::floatChannels(form), isComponent);
+  if (components && std::ranges::any_of(changed, isComponent) != (std::ranges::find(changed, "R") != changed.end()))
+    lines.emplace_back("R G B and its components (diffuse, specular) were not graded alike: their sum is another now");
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::grade(std::move(deepOf(in[0])), params); };
+  operation.summary = [=] { return lines; };
+  return operation;
+}
+
+}  // namespace
+
 void addColourOperations(std::vector<OperationSpec>& table) {
-  (void)table;
+  using enum ImageKind;
+  using Type = ArgumentType;
+  table.push_back(
+      {"grade",
+       "Change colours, everywhere or between two depths: gain, then offset, gamma and saturation. Give one "
+       "number, or three for R,G,B.",
+       {Deep},
+       false,
+       {{"gain", Type::Numbers, "1", "multiplies"},
+        {"offset", Type::Numbers, "0", "is added"},
+        {"gamma", Type::Numbers, "1", "above 1 brightens the middle; above 0"},
+        {"saturation", Type::Number, "1", "0 is grey, 1 as it is"},
+        {"near", Type::Number, "-inf", "the nearest depth that changes"},
+        {"far", Type::Number, "inf", "the first depth that stays again"},
+        {"nearsoft", Type::Number, "0", "the depth before near over which it comes in"},
+        {"farsoft", Type::Number, "0", "the depth behind far over which it goes out"},
+        {"channels", Type::Text, "R,G,B", "channels or layers, such as diffuse"}},
+       makeGrade});
 }
 
 }  // namespace fathom::cli

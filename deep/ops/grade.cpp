@@ -1,0 +1,125 @@
+// Source of the order and the luminance: the ASC colour decision list (slope, offset, power, saturation). Written so
+// that only gamma divides by alpha.
+#include "deep/ops/grade.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "deep/ops/named_channels.h"
+#include "deep/volume.h"
+#include "flat/error.h"
+#include "flat/parallel.h"
+
+namespace fathom::deep {
+
+namespace {
+
+constexpr size_t kBlock = 1024;  // samples that are worked on at once, in the cache
+constexpr std::array<float, 3> kLuminance{0.2126f, 0.7152f, 0.0722f};
+
+using Block = std::array<float, kBlock>;
+// The values of R, G and B of one layer; null where a channel is missing.
+using Triple = std::array<float*, 3>;
+
+size_t component(const std::string& channel) {
+  const size_t at = std::string_view("RGB").find(channel.back());
+  const bool last = channel.size() == 1 || channel[channel.size() - 2] == '.';
+  if (at == std::string_view::npos || !last) fail("grade: expected channels R, G and B, found {}", channel);
+  return at;
+}
+
+std::vector<Triple> triplesOf(DeepImage& image, const std::vector<std::string>& channels, bool whole) {
+  std::vector<Triple> triples;
+  std::vector<std::string> layers;
+  for (const std::string& name : channels) {
+    const std::string layer = name.substr(0, name.size() - 1);
+    const auto found = std::ranges::find(layers, layer);
+    const auto at = size_t(found - layers.begin());
+    if (found == layers.end()) layers.push_back(layer), triples.push_back({});
+    triples[at][component(name)] = image.get(name).data();
+  }
+  for (size_t i = 0; i < triples.size(); ++i)
+    for (size_t c = 0; whole && c < 3; ++c)
+      if (!triples[i][c]) fail("grade: saturation: expected channel {}{} among those to grade", layers[i], "RGB"[c]);
+  return triples;
+}
+
+float smooth(float t) {
+  t = std::clamp(t, 0.0f, 1.0f);
+  return t * t * (3 - 2 * t);
+}
+
+float weightAt(const GradeParams& params, float z) {
+  float weight = 1;
+  if (z < params.near) weight = params.nearWidth > 0 ? smooth(1 - (params.near - z) / params.nearWidth) : 0;
+  if (z >= params.far && params.far < std::numeric_limits<float>::infinity())
+    weight *= params.farWidth > 0 ? smooth(1 - (z - params.far) / params.farWidth) : 0;
+  return weight;
+}
+
+// What is known of a block's samples, whatever the channel.
+struct Samples {
+  size_t count;
+  Block alpha, weight;
+};
+
+void gradeTriple(const GradeParams& params, const Samples& samples, const Triple& values, std::array<Block, 3>& out) {
+  for (size_t c = 0; c < 3; ++c) {
+    const float* in = values[c];
+    if (!in) continue;
+    const float gain = params.gain[c], offset = params.offset[c], power = 1 / params.gamma[c];
+    for (size_t i = 0; i < samples.count; ++i) out[c][i] = finiteOrZero(in[i]) * gain + samples.alpha[i] * offset;
+    for (size_t i = 0; power != 1 && i < samples.count; ++i)
+      if (samples.alpha[i] > 0 && out[c][i] > 0)
+        out[c][i] = std::min(std::pow(out[c][i] / samples.alpha[i], power) * samples.alpha[i], kLargest);
+  }
+  if (params.saturation == 1) return;
+  for (size_t i = 0; i < samples.count; ++i) {
+    const float grey = kLuminance[0] * out[0][i] + kLuminance[1] * out[1][i] + kLuminance[2] * out[2][i];
+    for (size_t c = 0; c < 3; ++c) out[c][i] = grey + params.saturation * (out[c][i] - grey);
+  }
+}
+
+void store(const Samples& samples, const Block& graded, float* values) {
+  for (size_t i = 0; i < samples.count; ++i) {
+    const float weight = samples.weight[i], before = values[i];
+    const float after = std::min(std::max(graded[i], -kLargest), kLargest);
+    values[i] = weight == 0 ? before : (1 - weight) * finiteOrZero(before) + weight * after;
+  }
+}
+
+void check(const GradeParams& params) {
+  for (const float gamma : params.gamma)
+    if (!(gamma > 0)) fail("grade: gamma: expected numbers above 0, found {}", gamma);
+}
+
+}  // namespace
+
+DeepImage grade(DeepImage image, const GradeParams& params) {
+  check(params);
+  const std::vector<std::string> channels = channelsNamed("grade", params.channels, floatChannels(image));
+  for (const std::string& name : statisticsOf(image, channels)) image.erase(name);
+  const std::vector<Triple> triples = triplesOf(image, channels, params.saturation != 1);
+  const std::span<const float> alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");
+  const size_t total = image.samples();
+  parallelFor(0, int((total + kBlock - 1) / kBlock), [&](int block) {
+    const size_t first = size_t(block) * kBlock;
+    Samples samples{std::min(kBlock, total - first), {}, {}};
+    for (size_t i = 0; i < samples.count; ++i) {
+      const size_t s = first + i;
+      samples.alpha[i] = float(opacity(alpha[s]));
+      samples.weight[i] = weightAt(params, float(usableRange(z[s], zBack.empty() ? z[s] : zBack[s]).middle()));
+    }
+    std::array<Block, 3> graded;
+    for (Triple values : triples) {
+      for (float*& channel : values)
+        if (channel) channel += first;
+      gradeTriple(params, samples, values, graded);
+      for (size_t c = 0; c < 3; ++c)
+        if (values[c]) store(samples, graded[c], values[c]);
+    }
+  });
+  return image;
+}
+
+}  // namespace fathom::deep
