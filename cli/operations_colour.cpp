@@ -1,10 +1,15 @@
-// Operations that change values, and how many samples carry them: grade.
+// Operations that change values, and how many samples carry them: grade, recolour.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <memory>
 
 #include "cli/operation.h"
 #include "deep/ops/grade.h"
 #include "deep/ops/named_channels.h"
+#include "deep/ops/recolour.h"
 #include "flat/error.h"
 
 namespace fathom::cli {
@@ -58,6 +63,26 @@ Operation makeGrade(const Arguments& arguments, std::span<const InputForm> input
   Operation operation;
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::grade(std::move(deepOf(in[0])), params); };
   operation.summary = [=] { return lines; };
+  return operation;
+}
+
+Operation makeRecolour(const Arguments& arguments, std::span<const InputForm> inputs) {
+  const deep::RecolourParams params{.channels = arguments.words("channels"), .matte = arguments.flag("matte")};
+  const deep::DeepImage& form = deepOf(inputs[0].image);
+  const auto lines = describeDropped(form, deep::recolour(form.copy(), flatOf(inputs[1].image), params));
+  const auto uncovered = std::make_shared<std::atomic<uint64_t>>(0);
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    *uncovered += deep::countUncovered(deepOf(in[0]), flatOf(in[1]), params);
+    return deep::recolour(std::move(deepOf(in[0])), flatOf(in[1]), params);
+  };
+  operation.summary = [=] {
+    std::vector<std::string> all = lines;
+    if (*uncovered > 0)
+      all.push_back(
+          fmt::format("{} pixels of the flat image have no deep sample: their colour is lost", uncovered->load()));
+    return all;
+  };
   return operation;
 }
 
