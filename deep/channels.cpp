@@ -18,6 +18,11 @@ Role roleOf(std::string_view name, PixelType type) {
   return Role::Premultiplied;
 }
 
+bool holdsStatistics(const DeepImage& image) {
+  return image.attributes.getInt("fathom:spp") ||
+         std::ranges::any_of(image.channels, [](const Channel& c) { return describesSamples(roleOf(c)); });
+}
+
 size_t countNonFinite(const DeepImage& image) {
   std::vector<bool> found(image.samples(), false);
   for (const Channel& channel : image.channels) {

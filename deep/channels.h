@@ -28,6 +28,10 @@ inline bool describesSamples(Role role) {
   return role == Role::Half || role == Role::Statistic;
 }
 
+// Whether samples are camera samples or bins made of them (attribute fathom:spp, or channels of statistics): their alphas
+// count rays, so points at the same depth are composited one after the other and never merged.
+bool holdsStatistics(const DeepImage& image);
+
 // How many samples hold a premultiplied value that compositing takes for 0 (see finiteOrZero).
 size_t countNonFinite(const DeepImage& image);
 

@@ -98,13 +98,6 @@ bool hasFlatForm(const Channel& channel) {
   return role != Role::Statistic && role != Role::Identifier && channel.name != "ZBack";
 }
 
-// Samples of camera rays: their alphas count rays, so merging two at the same depth would change what each stands for.
-bool holdsStatistics(const DeepImage& image) {
-  return image.attributes.getInt("fathom:spp") ||
-         std::any_of(image.channels.begin(), image.channels.end(),
-                     [](const Channel& c) { return describesSamples(roleOf(c)); });
-}
-
 }  // namespace
 
 flat::Image flatten(const DeepImage& image) {

@@ -115,8 +115,9 @@ std::vector<std::string> dropSampleStatistics(DeepImage& image) {
   return dropped;
 }
 
-TidyResult tidy(DeepImage image) {
-  const Untidiness untidiness = findUntidiness(image);
+TidyResult tidy(DeepImage image, bool mergePoints) {
+  Untidiness untidiness = findUntidiness(image);
+  untidiness.pointsCoincide &= mergePoints;
   const std::span<const float> alpha = image.get("A");
   TidyResult result;
   if (!untidiness.any()) return {std::move(image), {}};
@@ -125,7 +126,7 @@ TidyResult tidy(DeepImage image) {
   out = {image.dataWindow, image.displayWindow, Buffer<uint64_t>(image.offsets.size(), 0), {}, image.attributes};
   out.attributes.erase("deepImageState");
   forEachPixel(image, [&](PixelPieces& pieces, size_t pixel) {
-    const PixelPieces::Size size = pieces.size(true);
+    const PixelPieces::Size size = pieces.size(mergePoints);
     checkOverlaps(size, image.dataWindow, pixel);
     out.offsets[pixel + 1] = size.pieces;
   });
@@ -134,7 +135,7 @@ TidyResult tidy(DeepImage image) {
   forEachPixel(image, [&](PixelPieces& pieces, size_t pixel) {
     const size_t first = image.offsets[pixel];
     size_t to = out.offsets[pixel];
-    pieces.visit(alpha.subspan(first, image.count(pixel)), true,
+    pieces.visit(alpha.subspan(first, image.count(pixel)), mergePoints,
                  [&](const Piece& piece) { write(piece, image, first, out, to++); });
   });
   return result;

@@ -35,6 +35,7 @@ struct TidyResult {
 // Ranges that cannot be used (reversed, infinite, no number) become points, a Z that is no number becomes infinity.
 // Throws Error when A or Z is missing, and when the volumes of one pixel overlap so much that their pieces would be
 // more than 100 million.
-TidyResult tidy(DeepImage image);
+// Without `mergePoints`, points at the same depth stay one after the other (see holdsStatistics).
+TidyResult tidy(DeepImage image, bool mergePoints = true);
 
 }  // namespace fathom::deep

@@ -165,6 +165,17 @@ TEST(Tidy, DropsStatisticsOnlyWhereItMerges) {
   EXPECT_FALSE(merged.image.find("samples"));
 }
 
+TEST(Tidy, LeavesPointsAtTheSameDepthApartWhereAsked) {
+  const Pixels pixels = {{{1, 3, 0.5f, 1, 1}, {2, 2, 0.5f, 1, 2}, {2, 2, 0.25f, 1, 3}},
+                         {{4, 4, 1, 1, 4}, {4, 4, 1, 2, 5}}};
+  const DeepImage apart = tidy(makeDeep(pixels, 2), false).image;
+  ASSERT_EQ(apart.samples(), 6u);
+  EXPECT_THAT(listOf(apart.find("id")->ids), ElementsAre(1, 2, 3, 1, 4, 5));
+  DeepImage statistical = makeDeep(pixels, 2);
+  statistical.attributes.set("fathom:spp", 4);
+  EXPECT_NEAR(flatten(apart).get("A").values[0], flatten(statistical).get("A").values[0], 1e-6);
+}
+
 TEST(Tidy, AveragesWhatIsNotPremultiplied) {
   DeepImage image = makeDeep({{{1, 2, 0.5f, 1, 1}, {1, 2, 0.75f, 1, 2}}}, 1);
   Buffer<float>& coc = image.add("coc", PixelType::Float).values;
