@@ -107,6 +107,14 @@ void addColourOperations(std::vector<OperationSpec>& table) {
         {"farsoft", Type::Number, "0", "the depth behind far over which it goes out"},
         {"channels", Type::Text, "R,G,B", "channels or layers, such as diffuse"}},
        makeGrade});
+  table.push_back({"recolour",
+                   "Give the deep samples the colour of a flat image, which may have been graded or painted on: "
+                   "flattened, they make it up again. With matte, their alphas make up its alpha, too.",
+                   {Deep, Flat},
+                   false,
+                   {{"matte", Type::Flag, "0", "take the alpha of the flat image, too"},
+                    {"channels", Type::Text, "R,G,B", "channels or layers of the flat image"}},
+                   makeRecolour});
 }
 
 }  // namespace fathom::cli
