@@ -1,5 +1,6 @@
 // Operations on what stands in front of what, and on volumes: holdout.
 #include "cli/operation.h"
+#include "deep/clip.h"
 #include "deep/ops/holdout.h"
 #include "flat/error.h"
 
@@ -24,6 +25,15 @@ Operation makeHoldoutMatte(const Arguments&, std::span<const InputForm>) {
       .apply = [](std::vector<AnyImage> in) -> AnyImage { return deep::holdoutMatte(deepOf(in[0]), deepOf(in[1])); }};
 }
 
+Operation makeClipMap(const Arguments& arguments, std::span<const InputForm> inputs) {
+  const std::string channel = arguments.text("channel");
+  const deep::Side side = arguments.text("keep") == "front" ? deep::Side::Front : deep::Side::Behind;
+  flatOf(inputs[1].image).get(channel);
+  return {.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    return deep::clipByMap(deepOf(in[0]), flatOf(in[1]), channel, side);
+  }};
+}
+
 }  // namespace
 
 void addVolumeOperations(std::vector<OperationSpec>& table) {
@@ -46,6 +56,15 @@ void addVolumeOperations(std::vector<OperationSpec>& table) {
                    false,
                    {},
                    makeHoldoutMatte});
+  table.push_back(
+      {"clipmap",
+       "What lies in front of, or behind, the depths of a flat image; a volume there is cut. Pixels that it "
+       "has no depth for stay as they are.",
+       {Deep, Flat},
+       false,
+       {{"keep", Type::Text, "front", "front or behind", false, {"front", "behind"}},
+        {"channel", Type::Text, "Z", "the channel of the flat image with the depths"}},
+       makeClipMap});
 }
 
 }  // namespace fathom::cli

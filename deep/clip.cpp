@@ -1,71 +1,92 @@
 #include "deep/clip.h"
 
 #include <algorithm>
-#include <optional>
-#include <vector>
+#include <cmath>
+#include <limits>
 
 #include "deep/channels.h"
+#include "deep/ops/sample_plan.h"
+#include "deep/tidy.h"
 #include "deep/volume.h"
 
 namespace fathom::deep {
 
 namespace {
 
-// A sample that stays, and what of it.
-struct Kept {
-  size_t sample;
-  Range range;
-  Part part;
-  bool cut;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+struct Planes {
+  float near, far;
+
+  bool has(float z) const { return z >= near && (z < far || (far == kInfinity && near < far)); }
+  Range within(const Range& range) const { return {std::max(range.z, near), std::min(range.zBack, far)}; }
 };
 
-// What of one sample lies in [near, far), or nothing.
-std::optional<Kept> keep(size_t sample, const Range& range, float alpha, float near, float far) {
-  const Range inside = {std::max(range.z, near), range.isPoint() ? range.z : std::min(range.zBack, far)};
+struct Samples {
+  const DeepImage& image;
+  std::span<const float> alpha, z, zBack;
+
+  explicit Samples(const DeepImage& of) : image(of), alpha(of.get("A")), z(of.get("Z")), zBack(of.tryGet("ZBack")) {}
+  Range range(size_t i) const { return usableRange(z[i], zBack.empty() ? z[i] : zBack[i]); }
+};
+
+// Adds what of a sample lies between the planes.
+void plan(const Samples& samples, size_t i, const Planes& planes, RowPlan& row) {
+  const Range range = samples.range(i);
   if (range.isPoint()) {
-    if (!(range.z >= near && range.z < far)) return {};
-    return Kept{sample, range, {}, false};
+    if (planes.has(range.z)) row.keep(i);
+    return;
   }
-  if (!(inside.z < inside.zBack)) return {};
-  if (inside == range) return Kept{sample, range, {}, false};
+  const Range inside = planes.within(range);
+  if (!(inside.z < inside.zBack)) return;
+  if (inside == range) {
+    row.keep(i);
+    return;
+  }
   const double fraction = (double(inside.zBack) - inside.z) / (double(range.zBack) - range.z);
-  return Kept{sample, inside, partOf(opacity(alpha), fraction), true};
+  const Part part = partOf(opacity(samples.alpha[i]), fraction);
+  row.change(i, inside.z, inside.zBack, float(part.alpha), float(part.weight));
 }
 
-float valueOf(const Channel& channel, Role role, const Kept& kept) {
-  const float value = channel.values[kept.sample];
-  if (!kept.cut) return value;
-  if (channel.name == "Z") return kept.range.z;
-  if (channel.name == "ZBack") return kept.range.zBack;
-  if (role == Role::Alpha) return float(kept.part.alpha);
-  return role == Role::Premultiplied ? float(kept.part.weight * double(value)) : value;
+// Clips with planesOf(x, y) at each pixel.
+template <class PlanesOf>
+DeepImage clipWith(const DeepImage& image, const PlanesOf& planesOf) {
+  const Samples samples(image);
+  return mapRows(image, [&](int y, RowPlan& row) {
+    for (int x = image.dataWindow.x0; x < image.dataWindow.x1; ++x) {
+      const size_t pixel = image.dataWindow.index(x, y);
+      const Planes planes = planesOf(x, y);
+      row.nextPixel();
+      for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i) plan(samples, i, planes, row);
+    }
+  });
 }
 
 }  // namespace
 
 DeepImage clip(const DeepImage& image, float near, float far) {
-  const auto alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");
-  DeepImage result{
-      image.dataWindow, image.displayWindow, Buffer<uint64_t>(image.pixels() + 1, 0), {}, image.attributes};
-  std::vector<Kept> kept;
-  bool anyCut = false;
-  for (size_t pixel = 0; pixel < image.pixels(); ++pixel) {
-    for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i) {
-      const Range range = usableRange(z[i], zBack.empty() ? z[i] : zBack[i]);
-      if (const auto stays = keep(i, range, alpha[i], near, far)) kept.push_back(*stays), anyCut |= stays->cut;
-    }
-    result.offsets[pixel + 1] = kept.size();
+  DeepImage result = clipWith(image, [&](int, int) { return Planes{near, far}; });
+  if (holdsStatistics(image) && clipCuts(image, near, far)) dropSampleStatistics(result);
+  return result;
+}
+
+bool clipCuts(const DeepImage& image, float near, float far) {
+  const auto z = image.get("Z"), zBack = image.tryGet("ZBack");
+  for (size_t i = 0; i < zBack.size(); ++i) {
+    const Range range = usableRange(z[i], zBack[i]), inside = Planes{near, far}.within(range);
+    if (!range.isPoint() && inside.z < inside.zBack && !(inside == range)) return true;
   }
-  for (const Channel& channel : image.channels) {
-    const Role role = roleOf(channel);
-    if (anyCut && describesSamples(role)) continue;
-    Channel& out = result.add(channel.name, channel.type);
-    for (size_t k = 0; k < kept.size(); ++k)
-      if (channel.type == PixelType::Uint)
-        out.ids[k] = channel.ids[kept[k].sample];
-      else
-        out.values[k] = valueOf(channel, role, kept[k]);
-  }
+  return false;
+}
+
+DeepImage clipByMap(const DeepImage& image, const flat::Image& map, std::string_view channel, Side keep) {
+  const Buffer<float>& depth = map.get(channel).values;
+  DeepImage result = clipWith(image, [&](int x, int y) {
+    const float z = map.dataWindow.contains(x, y) ? depth[map.dataWindow.index(x, y)] : std::nanf("");
+    if (std::isnan(z)) return Planes{-kInfinity, kInfinity};
+    return keep == Side::Front ? Planes{-kInfinity, z} : Planes{z, kInfinity};
+  });
+  if (image.find("ZBack")) dropSampleStatistics(result);
   return result;
 }
 

@@ -7,7 +7,9 @@
 
 #include "deep/flatten.h"
 #include "deep/tidy.h"
+#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
+#include "tests/reference/random_deep.h"
 
 namespace fathom::deep {
 namespace {
@@ -95,6 +97,57 @@ TEST(Clip, StatisticsOfCutSamplesAreVoid) {
   const DeepImage cut = clip(image, 0, 3);
   for (const char* name : {"variance.R", "samples", "half0.R"}) EXPECT_FALSE(cut.find(name)) << name;
   EXPECT_TRUE(cut.find("R"));
+}
+
+TEST(Clip, PlanesAtInfinityCutNothing) {
+  const DeepImage image = makeDeep({{{1, 4, 0.5f, 0.1f, 7}, {kInfinity, kInfinity, 1, 0.2f, 8}}}, 1);
+  EXPECT_EQ(clip(image, -kInfinity, kInfinity).samples(), 2u);
+  EXPECT_EQ(clip(image, 1, kInfinity).samples(), 2u);
+  EXPECT_EQ(clip(image, -kInfinity, 100).samples(), 1u);
+  EXPECT_EQ(clip(image, kInfinity, kInfinity).samples(), 0u);
+  EXPECT_FALSE(clipCuts(image, 1, kInfinity));
+  EXPECT_FALSE(clipCuts(image, 0, 1));
+  EXPECT_TRUE(clipCuts(image, 2, kInfinity));
+}
+
+TEST(Clip, IsTheSameForAnyBandOfRows) {
+  const DeepImage image = makeStack(5), whole = clip(image, 1, 2);
+  for (int y = image.dataWindow.y0; y < image.dataWindow.y1; ++y)
+    EXPECT_EQ(reference::difference(clip(rows(image, y, y + 1), 1, 2), rows(whole, y, y + 1)), "");
+}
+
+flat::Image mapOf(const Box& window, float z) {
+  flat::Image map{window, window, {}, {}};
+  map.add("depth", z);
+  return map;
+}
+
+TEST(ClipByMap, OfOneDepthIsClip) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const DeepImage image = makeStack(seed);
+    const flat::Image map = mapOf({0, -4, 20, 20}, 1.7f);
+    EXPECT_EQ(reference::difference(clipByMap(image, map, "depth", Side::Front), clip(image, -kInfinity, 1.7f)), "");
+    EXPECT_EQ(reference::difference(clipByMap(image, map, "depth", Side::Behind), clip(image, 1.7f, kInfinity)), "");
+  }
+}
+
+TEST(ClipByMap, LeavesPixelsWithoutADepthAsTheyAre) {
+  DeepImage image = makeStack(4);
+  flat::Image map = mapOf({3, -2, 5, 0}, 0.0f);
+  map.planes[0].values[0] = std::numeric_limits<float>::quiet_NaN();
+  map.planes[0].values[1] = kInfinity;
+  const DeepImage kept = clipByMap(image, map, "depth", Side::Front);
+  for (int y = image.dataWindow.y0; y < image.dataWindow.y1; ++y)
+    for (int x = image.dataWindow.x0; x < image.dataWindow.x1; ++x) {
+      const size_t pixel = image.dataWindow.index(x, y);
+      const bool cleared = map.dataWindow.contains(x, y) && y == -1;
+      EXPECT_EQ(kept.count(pixel), cleared ? 0 : image.count(pixel)) << x << ", " << y;
+    }
+  EXPECT_THROW(clipByMap(image, map, "Z", Side::Front), Error);
+  image.add("samples", PixelType::Float).values.fill(1);
+  EXPECT_FALSE(clipByMap(image, map, "depth", Side::Front).find("samples"));
+  image.erase("ZBack");
+  EXPECT_TRUE(clipByMap(image, map, "depth", Side::Front).find("samples"));
 }
 
 TEST(Clip, WithoutZBackAllSamplesArePoints) {
