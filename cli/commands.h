@@ -9,10 +9,11 @@ namespace fathom::cli {
 void addInfo(CLI::App& app);
 void addConvert(CLI::App& app);
 void addCluster(CLI::App& app);
-void addTidyAndFlatten(CLI::App& app);
 void addDenoise(CLI::App& app);
 void addCompare(CLI::App& app);
 void addPng(CLI::App& app);
+void addComp(CLI::App& app);
+void addOperations(CLI::App& app);  // one each
 
 // The exit status of a command that was told to stop.
 constexpr int kInterrupted = 130;

@@ -97,7 +97,7 @@ bool ChunkReader::open() {
 bool ChunkReader::isDone(const FrameOutputs& outputs, const std::string& madeBy) const {
   bool done = true;
   for (const std::string& file : outputs.files()) {
-    const Standing standing = standingOf(file, madeBy);
+    const Standing standing = standingOf(file, kMadeBy, madeBy);
     if (standing == Standing::Other && !job_.overwrite)
       fail(
           "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "

@@ -1,22 +1,15 @@
 #include "cli/denoise_stats.h"
 
-#include <sys/resource.h>
-
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "cli/peak_memory.h"
 #include "flat/error.h"
 
 namespace fathom::cli {
 
 namespace {
-
-int64_t peakMemory() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return int64_t(usage.ru_maxrss) * 1024;
-}
 
 const char* nameOf(FrameReport::Status status) {
   switch (status) {

@@ -103,12 +103,12 @@ std::vector<std::string> FrameOutputs::files() const {
   return result;
 }
 
-Standing standingOf(const std::string& path, const std::string& madeBy) {
+Standing standingOf(const std::string& path, const char* attribute, const std::string& madeBy) {
   std::error_code none;
   if (!std::filesystem::exists(path, none)) return Standing::Missing;
   try {
     for (const deep::PartInfo& part : deep::readParts(path))
-      if (part.attributes.getString(kMadeBy) == madeBy) return Standing::Ours;
+      if (part.attributes.getString(attribute) == madeBy) return Standing::Ours;
   } catch (const Error&) {
     // Not even an EXR file: certainly not made by this run.
   }

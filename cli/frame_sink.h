@@ -27,8 +27,8 @@ struct FrameOutputs {
 
 enum class Standing { Missing, Ours, Other };
 
-// Whether a file is there and was made by the run that `madeBy` describes.
-Standing standingOf(const std::string& path, const std::string& madeBy);
+// Whether a file is there and was made by the run that `madeBy` describes in an attribute.
+Standing standingOf(const std::string& path, const char* attribute, const std::string& madeBy);
 
 // Where the image that comes in comes from, and what goes with it.
 struct FrameOrigin {

@@ -63,8 +63,7 @@ struct Operation {
   std::function<Box(std::span<const Box> windows)> window = {};
   // The rows of one input that rows of the result are made of; empty: the same rows.
   std::function<Rows(size_t input, Rows result)> needs = {};
-  // Where what is done depends on the whole image: called with every band of the first input, from several threads at
-  // once, before `apply` is called with any rows. It costs a pass over the inputs: left empty where there is nothing
+  // Where what is done depends on the whole image: called with every band of the first input, from the top, before `apply` is called with any rows. It costs a pass over the inputs: left empty where there is nothing
   // to find out.
   std::function<void(const AnyImage& band)> scan = {};
   // Called with every band of the result, from the top, by one thread: for what is made of an image beside an image.
@@ -87,6 +86,7 @@ struct OperationSpec {
   std::vector<ArgumentSpec> arguments;
   // Throws Error where the arguments or the inputs do not do.
   std::function<Operation(const Arguments& arguments, std::span<const InputForm> inputs)> make;
+  bool watches = false;  // makes something beside an image: a chain with it needs no -o
 };
 
 // All operations, in the order in which help lists them. Each family has a file of its own.

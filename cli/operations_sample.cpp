@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 
 #include "cli/operation.h"
 #include "deep/channels.h"
@@ -61,9 +60,7 @@ Operation makeCrop(const Arguments& arguments, std::span<const InputForm>) {
 
 // What tidying found in the whole image and did to it.
 struct TidyCount {
-  std::mutex mutex;
   deep::Untidiness untidiness;
-  bool scanned = false;
   std::atomic<uint64_t> before = 0, after = 0;
 };
 
@@ -72,11 +69,7 @@ Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
   deep::DeepImage form = deepOf(inputs[0].image).copy();
   const std::vector<std::string> statistics = deep::dropSampleStatistics(form);
   Operation operation;
-  operation.scan = [count](const AnyImage& band) {
-    const deep::Untidiness found = deep::findUntidiness(deepOf(band));
-    const std::lock_guard lock(count->mutex);
-    count->untidiness |= found;
-  };
+  operation.scan = [count](const AnyImage& band) { count->untidiness |= deep::findUntidiness(deepOf(band)); };
   const auto merges = [count] { return count->untidiness.pointsCoincide || count->untidiness.volumesOverlap; };
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
     deep::DeepImage& image = deepOf(in[0]);

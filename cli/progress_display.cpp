@@ -63,6 +63,13 @@ void ProgressDisplay::frameDone(const std::string& line) {
   std::fflush(stdout);
 }
 
+void ProgressDisplay::say(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  clear();
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
 void ProgressDisplay::tell(const std::string& line) {
   const std::lock_guard lock(mutex_);
   clear();

@@ -16,6 +16,8 @@ class ProgressDisplay {
   void at(double fraction);
   // A frame is done (or failed): the line is shown where there is no bar.
   void frameDone(const std::string& line);
+  // A line of a result, on the standard output, above the bar.
+  void say(const std::string& line);
   // A line for the user that is no result: on stderr, above the bar.
   void tell(const std::string& line);
 

@@ -75,7 +75,7 @@ struct WriteOptions {
   Compression compression = Compression::Zips;
   int tileWidth = 0, tileHeight = 0;  // both > 0: deep tiles, else deep scanlines
   // The file and part number that the image came from: its other parts are copied verbatim, in their order.
-  std::string otherPartsOf;
+  std::string otherPartsOf = {};
   int replacedPart = 0;
 };
 

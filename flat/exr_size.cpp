@@ -19,8 +19,8 @@ namespace fathom::flat {
 
 namespace {
 
-constexpr double kRowsPerBlock =
-    256;  // readers hold whole blocks of rows: OpenImageIO that many, however few there are
+// Readers hold whole blocks of rows, OpenImageIO that many at least, however few the image has.
+constexpr double kRowsPerBlock = 256;
 
 // What a reader of one part holds at least. In doubles, since windows may span all integers.
 double decodedBytes(const Imf::Header& header) {

@@ -1,8 +1,12 @@
 // Things made in parallel and taken in order.
 #pragma once
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -10,40 +14,57 @@
 
 #ifndef __SANITIZE_THREAD__
 #include <tbb/parallel_pipeline.h>
-#include <tbb/task_arena.h>
 #endif
 
 namespace fathom {
 
-// Calls take(i, make(i)) for every index in [begin, end): `make` from many threads at once, `take` in ascending order, one
-// call at a time. Few results wait at any moment. After an exception, which is thrown on, nothing more is taken.
-template <class Make, class Take>
-void parallelInOrder(size_t begin, size_t end, const Make& make, const Take& take) {
-  using Made = decltype(make(begin));
+// For every index in [begin, end): fetch(i), one call at a time in ascending order; make(i, what was fetched), from many
+// threads at once; take(i, what was made), in ascending order, one call at a time. At most `most` indices are under way
+// at any moment. After an exception, which is thrown on, nothing more is taken.
+template <class Fetch, class Make, class Take>
+void parallelPipeline(size_t begin, size_t end, size_t most, const Fetch& fetch, const Make& make, const Take& take) {
+  using Fetched = decltype(fetch(begin));
+  using Made = decltype(make(begin, std::declval<Fetched>()));
 #ifdef __SANITIZE_THREAD__
   // See flat/parallel.h.
-  constexpr size_t kBatch = 16;
-  for (size_t first = begin; first < end; first += kBatch) {
-    std::vector<Made> batch(std::min(kBatch, end - first));
-    parallelFor(0, int(batch.size()), [&](int i) { batch[size_t(i)] = make(first + size_t(i)); });
-    for (size_t i = 0; i < batch.size(); ++i) take(first + i, batch[i]);
+  for (size_t first = begin; first < end; first += most) {
+    std::vector<std::optional<Fetched>> fetched(std::min(most, end - first));
+    std::vector<std::optional<Made>> made(fetched.size());
+    for (size_t i = 0; i < fetched.size(); ++i) fetched[i].emplace(fetch(first + i));
+    parallelFor(0, int(made.size()),
+                [&](int i) { made[size_t(i)].emplace(make(first + size_t(i), std::move(*fetched[size_t(i)]))); });
+    for (size_t i = 0; i < made.size(); ++i) take(first + i, std::move(*made[i]));
   }
 #else
-  using Numbered = std::pair<size_t, Made>;
+  // oneTBB copies what goes between filters.
+  using Under = std::pair<size_t, std::shared_ptr<Fetched>>;
+  using Done = std::pair<size_t, std::shared_ptr<Made>>;
   size_t next = begin;
-  const auto number = [&](tbb::flow_control& control) {
-    if (next < end) return next++;
-    control.stop();
-    return end;
+  const auto first = [&](tbb::flow_control& control) -> Under {
+    if (next >= end) {
+      control.stop();
+      return {};
+    }
+    auto fetched = std::make_shared<Fetched>(fetch(next));
+    return {next++, std::move(fetched)};
   };
-  tbb::parallel_pipeline(
-      2 * size_t(tbb::this_task_arena::max_concurrency()),
-      tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order, number) &
-          tbb::make_filter<size_t, Numbered>(tbb::filter_mode::parallel,
-                                             [&](size_t i) { return Numbered(i, make(i)); }) &
-          tbb::make_filter<Numbered, void>(tbb::filter_mode::serial_in_order,
-                                           [&](const Numbered& made) { take(made.first, made.second); }));
+  const auto second = [&](const Under& under) {
+    return Done(under.first, std::make_shared<Made>(make(under.first, std::move(*under.second))));
+  };
+  const auto third = [&](const Done& done) { take(done.first, std::move(*done.second)); };
+  tbb::parallel_pipeline(most, tbb::make_filter<void, Under>(tbb::filter_mode::serial_in_order, first) &
+                                   tbb::make_filter<Under, Done>(tbb::filter_mode::parallel, second) &
+                                   tbb::make_filter<Done, void>(tbb::filter_mode::serial_in_order, third));
 #endif
+}
+
+// Calls take(i, make(i)) for every index in [begin, end): `make` from many threads at once, `take` in ascending order,
+// one call at a time. Few results wait at any moment. After an exception, which is thrown on, nothing more is taken.
+template <class Make, class Take>
+void parallelInOrder(size_t begin, size_t end, const Make& make, const Take& take) {
+  const size_t most = 2 * size_t(tbb::this_task_arena::max_concurrency());
+  parallelPipeline(
+      begin, end, most, [](size_t i) { return i; }, [&](size_t i, size_t) { return make(i); }, take);
 }
 
 }  // namespace fathom

@@ -113,7 +113,7 @@ TEST(FlattenCommand, AMissingChannelIsOneLine) {
   const Ran ran = runFathom("flatten " + (folder / "in.exr") + " -o " + (folder / "out.exr"));
   EXPECT_EQ(ran.status, 1);
   EXPECT_EQ(lines(ran.err), 1u);
-  EXPECT_THAT(ran.err, HasSubstr((folder / "in.exr") + ": channel A"));
+  EXPECT_THAT(ran.err, HasSubstr((folder / "in.exr") + ": flatten: channel A"));
   EXPECT_FALSE(std::filesystem::exists(folder / "out.exr"));
 }
 

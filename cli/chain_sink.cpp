@@ -1,0 +1,68 @@
+#include "cli/chain_sink.h"
+
+#include <algorithm>
+
+#include "cli/chain_run.h"
+#include "deep/channels.h"
+#include "flat/error.h"
+#include "flat/io.h"
+#include "flat/tonemap.h"
+
+namespace fathom::cli {
+
+namespace {
+
+// Depths and statistics need the range of FLOAT; identifiers stay what they are.
+void storeAsHalf(deep::DeepImage& image) {
+  for (deep::Channel& channel : image.channels) {
+    const deep::Role role = deep::roleOf(channel);
+    if (role == deep::Role::Alpha || role == deep::Role::Premultiplied || role == deep::Role::Half)
+      channel.type = deep::PixelType::Half;
+  }
+}
+
+void toDisplay(flat::Image& image) {
+  for (flat::Plane& plane : image.planes)
+    if (plane.name == "R" || plane.name == "G" || plane.name == "B" || plane.name == "Y")
+      for (float& value : plane.values) value = float(flat::srgb(double(value)));
+}
+
+}  // namespace
+
+ChainSink::ChainSink(ChainSinkParams params, const AnyImage& form, const Box& dataWindow) : params_(std::move(params)) {
+  const bool png = params_.path.ends_with(".png");
+  if (const auto* deep = std::get_if<deep::DeepImage>(&form)) {
+    if (png) fail("{}: expected a flat image for a PNG, found a deep one; --flatten comes first", params_.path);
+    deep::DeepImage layout = deep->copy();
+    if (params_.half) storeAsHalf(layout);
+    if (!params_.madeBy.empty()) layout.attributes.set(kChainMadeBy, params_.madeBy);
+    writer_.emplace(params_.path, layout, dataWindow, params_.options);
+    return;
+  }
+  const auto& flat = std::get<flat::Image>(form);
+  flat_ = {dataWindow, flat.displayWindow, {}, flat.attributes};
+  if (!params_.madeBy.empty()) flat_.attributes[kChainMadeBy] = params_.madeBy;
+  for (const flat::Plane& plane : flat.planes) flat_.planes.push_back({plane.name, Buffer<float>(dataWindow.area())});
+}
+
+void ChainSink::write(AnyImage rows) {
+  if (writer_) {
+    if (params_.half) storeAsHalf(deepOf(rows));
+    return writer_->write(deepOf(rows));
+  }
+  const flat::Image& image = flatOf(rows);
+  const size_t first = flat_.dataWindow.index(image.dataWindow.x0, image.dataWindow.y0);
+  for (size_t c = 0; c < flat_.planes.size(); ++c)
+    std::ranges::copy(image.planes[c].values, flat_.planes[c].values.begin() + first);
+}
+
+void ChainSink::finish() {
+  if (writer_) return writer_->finish();
+  if (params_.path.ends_with(".png")) {
+    toDisplay(flat_);
+    return flat::writePng(params_.path, flat_);
+  }
+  flat::write(params_.path, flat_, {.half = params_.half});
+}
+
+}  // namespace fathom::cli
