@@ -1,4 +1,4 @@
-// Operations that change values, and how many samples carry them: grade, recolour.
+// Operations that change values, and how many samples carry them: grade, recolour, expression.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "cli/operation.h"
+#include "deep/ops/expression.h"
 #include "deep/ops/grade.h"
 #include "deep/ops/named_channels.h"
 #include "deep/ops/recolour.h"
@@ -28,6 +29,14 @@ std::vector<std::string> describeDropped(const deep::DeepImage& before, const de
     if (!after.find(channel.name)) names.push_back(channel.name);
   if (names.empty()) return {};
   return {joined("dropped, since they no longer describe the image:", names)};
+}
+
+std::vector<std::string> describeNew(const deep::DeepImage& before, const deep::DeepImage& after) {
+  std::vector<std::string> names;
+  for (const deep::Channel& channel : after.channels)
+    if (!before.find(channel.name)) names.push_back(channel.name);
+  if (names.empty()) return {};
+  return {joined("new channels:", names)};
 }
 
 // One number for all of R, G and B, or three.
@@ -86,6 +95,21 @@ Operation makeRecolour(const Arguments& arguments, std::span<const InputForm> in
   return operation;
 }
 
+Operation makeExpression(const Arguments& arguments, std::span<const InputForm> inputs) {
+  const deep::ExpressionParams params{.set = arguments.text("set"),
+                                      .unpremultiplied = arguments.flag("unpremultiplied")};
+  const deep::DeepImage& form = deepOf(inputs[0].image);
+  const deep::DeepImage result = deep::expression(form.copy(), params);
+  std::vector<std::string> lines = describeDropped(form, result);
+  std::ranges::copy(describeNew(form, result), std::back_inserter(lines));
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    return deep::expression(std::move(deepOf(in[0])), params);
+  };
+  operation.summary = [=] { return lines; };
+  return operation;
+}
+
 }  // namespace
 
 void addColourOperations(std::vector<OperationSpec>& table) {
@@ -115,6 +139,17 @@ void addColourOperations(std::vector<OperationSpec>& table) {
                    {{"matte", Type::Flag, "0", "take the alpha of the flat image, too"},
                     {"channels", Type::Text, "R,G,B", "channels or layers of the flat image"}},
                    makeRecolour});
+  table.push_back(
+      {"expression",
+       "Set channels from formulas, for instance set=\"R = R*0.5; A = clamp(A, 0, 1)\". Names are channels, x "
+       "and y of the pixel, i, the number of the sample in its pixel, and n, how many there are. Functions "
+       "are abs min max clamp lerp smoothstep floor ceil mod sqrt exp ln sin cos and more; choices are "
+       "written Z < 5 ? R : 0.",
+       {Deep},
+       false,
+       {{"set", Type::Text, "", "CHANNEL = FORMULA, any number with ; between them", true},
+        {"unpremultiplied", Type::Flag, "0", "work on colours divided by alpha"}},
+       makeExpression});
 }
 
 }  // namespace fathom::cli

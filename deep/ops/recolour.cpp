@@ -103,7 +103,10 @@ void scale(const Row& row, float* values) {
 DeepImage recolour(DeepImage deep, const flat::Image& flat, const RecolourParams& params) {
   const std::vector<std::string> names = planesNamed(flat, params);
   std::as_const(deep).get("A");
-  if (params.matte) dropSampleStatistics(deep);
+  if (params.matte) {
+    dropSampleStatistics(deep);
+    deep.attributes.erase("fathom:spp");
+  }
   for (const std::string& name : statisticsOf(deep, names)) deep.erase(name);
   for (const std::string& name : names)
     if (!deep.find(name)) deep.add(name, PixelType::Float);

@@ -27,8 +27,8 @@ struct RecolourParams {
 //
 // Depths, ids and all else pass bit for bit; channels that the deep image lacks are added. Samples may lie in any order
 // and overlap. Alphas count as opacity() has them; flat values that are not finite count as 0. Left out, since they say
-// nothing of the new values: variances and half buffers of what is recoloured, and with `matte` all of them and sample
-// counts. Halo 0. Throws Error when A is missing in `deep`, or in `flat` with `matte`; when `flat` has not all of
+// nothing of the new values: variances and half buffers of what is recoloured, and with `matte` all of them, sample
+// counts and the attribute fathom:spp. Halo 0. Throws Error when A is missing in `deep`, or in `flat` with `matte`; when `flat` has not all of
 // `channels`; when one of them is A, Z or of another kind that is not premultiplied, or UINT in `deep`.
 DeepImage recolour(DeepImage deep, const flat::Image& flat, const RecolourParams& params);
 
