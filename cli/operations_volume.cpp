@@ -1,7 +1,9 @@
 // Operations on what stands in front of what, and on volumes: holdout.
 #include "cli/operation.h"
 #include "deep/clip.h"
+#include "deep/ops/deepen.h"
 #include "deep/ops/holdout.h"
+#include "deep/ops/plus.h"
 #include "flat/error.h"
 
 namespace fathom::cli {
@@ -32,6 +34,29 @@ Operation makeClipMap(const Arguments& arguments, std::span<const InputForm> inp
   return {.apply = [=](std::vector<AnyImage> in) -> AnyImage {
     return deep::clipByMap(deepOf(in[0]), flatOf(in[1]), channel, side);
   }};
+}
+
+Box unionOf(const Box& a, const Box& b) {
+  if (a.empty() || b.empty()) return a.empty() ? b : a;
+  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
+}
+
+Operation makePlus(const Arguments&, std::span<const InputForm>) {
+  Operation operation;
+  operation.apply = [](std::vector<AnyImage> in) -> AnyImage {
+    return deep::plus(std::move(deepOf(in[0])), std::move(deepOf(in[1])));
+  };
+  operation.window = [](std::span<const Box> windows) { return unionOf(windows[0], windows[1]); };
+  return operation;
+}
+
+Operation makeDeepen(const Arguments& arguments, std::span<const InputForm> inputs) {
+  deep::DeepenParams params{.depthChannel = arguments.text("channel"),
+                            .thickness = float(arguments.number("thickness")),
+                            .extinction = arguments.text("alpha") == "extinction"};
+  if (arguments.has("z")) params.z = float(arguments.number("z"));
+  deep::deepen(flatOf(inputs[0].image), params);  // throws where they do not do
+  return {.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::deepen(flatOf(in[0]), params); }};
 }
 
 }  // namespace
@@ -65,6 +90,29 @@ void addVolumeOperations(std::vector<OperationSpec>& table) {
        {{"keep", Type::Text, "front", "front or behind", false, {"front", "behind"}},
         {"channel", Type::Text, "Z", "the channel of the flat image with the depths"}},
        makeClipMap});
+  table.push_back({"plus",
+                   "Add the light of the second image to the first: it hides nothing, and what is in front of it hides "
+                   "it.",
+                   {Deep, Deep},
+                   false,
+                   {},
+                   makePlus});
+  table.push_back({"deepen",
+                   "A flat image as a deep one, a sample in every pixel. Pixels without alpha and colour, or without a "
+                   "depth, stay empty. An image without alpha is opaque.",
+                   {Flat},
+                   false,
+                   {{"z", Type::Number, "", "one depth for all pixels, instead of the channel's"},
+                    {"channel", Type::Text, "Z", "the channel with the depths"},
+                    {"thickness", Type::Number, "0", "makes volumes that begin at the depth and are this deep"},
+                    {"alpha",
+                     Type::Text,
+                     "opacity",
+                     "opacity: alpha is that of the whole sample; extinction: alpha and colour are amounts per unit of "
+                     "thickness",
+                     false,
+                     {"opacity", "extinction"}}},
+                   makeDeepen});
 }
 
 }  // namespace fathom::cli
