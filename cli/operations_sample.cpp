@@ -44,9 +44,21 @@ Operation makeMerge(const Arguments& arguments, std::span<const InputForm> input
   return operation;
 }
 
-Operation makeClip(const Arguments& arguments, std::span<const InputForm>) {
+Operation makeClip(const Arguments& arguments, std::span<const InputForm> inputs) {
   const float near = float(arguments.number("near")), far = float(arguments.number("far"));
-  return {.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::clip(deepOf(in[0]), near, far); }};
+  const auto cuts = std::make_shared<std::atomic<bool>>(false);
+  deep::DeepImage form = deepOf(inputs[0].image).copy();
+  const bool mayCut = form.find("ZBack") && !deep::dropSampleStatistics(form).empty();
+  Operation operation;
+  if (mayCut)
+    operation.scan = [=](const AnyImage& band) {
+      if (deep::clipCuts(deepOf(band), near, far)) *cuts = true;
+    };
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    if (*cuts) deep::dropSampleStatistics(deepOf(in[0]));
+    return deep::clip(deepOf(in[0]), near, far);
+  };
+  return operation;
 }
 
 Operation makeCrop(const Arguments& arguments, std::span<const InputForm>) {
