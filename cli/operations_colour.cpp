@@ -1,4 +1,4 @@
-// Operations that change values, and how many samples carry them: grade, recolour, expression.
+// Operations that change values, and how many samples carry them: grade, recolour, expression, compress.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "cli/operation.h"
+#include "deep/ops/compress.h"
 #include "deep/ops/expression.h"
 #include "deep/ops/grade.h"
 #include "deep/ops/named_channels.h"
@@ -110,6 +111,30 @@ Operation makeExpression(const Arguments& arguments, std::span<const InputForm> 
   return operation;
 }
 
+Operation makeCompress(const Arguments& arguments, std::span<const InputForm> inputs) {
+  struct Count {
+    std::atomic<uint64_t> before = 0, after = 0;
+  };
+  const deep::CompressParams params{.error = arguments.number("error")};
+  const auto count = std::make_shared<Count>();
+  const deep::DeepImage& form = deepOf(inputs[0].image);
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    count->before += deepOf(in[0]).samples();
+    deep::DeepImage result = deep::compress(std::move(deepOf(in[0])), params);
+    count->after += result.samples();
+    return result;
+  };
+  operation.summary = [=, lines = describeDropped(form, deep::compress(form.copy(), params))] {
+    const double share = 100 * double(count->after) / double(std::max<uint64_t>(count->before, 1));
+    std::vector<std::string> all{
+        fmt::format("{} samples of {} ({:.1f} %)", count->after.load(), count->before.load(), share)};
+    std::ranges::copy(lines, std::back_inserter(all));
+    return all;
+  };
+  return operation;
+}
+
 }  // namespace
 
 void addColourOperations(std::vector<OperationSpec>& table) {
@@ -150,6 +175,14 @@ void addColourOperations(std::vector<OperationSpec>& table) {
        {{"set", Type::Text, "", "CHANNEL = FORMULA, any number with ; between them", true},
         {"unpremultiplied", Type::Flag, "0", "work on colours divided by alpha"}},
        makeExpression});
+  table.push_back(
+      {"compress",
+       "As few samples as look the same: what passes to any depth, and the colour in front of it, stay within "
+       "the error. What is hidden behind something opaque goes.",
+       {Deep},
+       false,
+       {{"error", Type::Number, "0.001", "the most that may change, where 1 is all of a pixel's light"}},
+       makeCompress});
 }
 
 }  // namespace fathom::cli

@@ -1,0 +1,187 @@
+// Compression: within the error at every depth, against the equation of transfer; exact as a whole; and few samples.
+#include "deep/ops/compress.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "deep/flatten.h"
+#include "deep/tidy.h"
+#include "flat/error.h"
+#include "tests/reference/deep_samples.h"
+#include "tests/reference/radiative.h"
+#include "tests/reference/random_ops.h"
+
+namespace fathom::deep {
+namespace {
+
+using reference::randomSamples;
+
+// Depths on both sides of every border of samples, and between them.
+std::vector<double> depthsOf(const std::vector<reference::Medium>& media) {
+  std::vector<double> depths{0};
+  for (const reference::Medium& medium : media)
+    for (const double z : {medium.z, std::max(medium.z, medium.zBack)})
+      for (const double offset : {-1e-9, 0.0, 1e-9, 0.11, 0.47}) depths.push_back(z * (1 + offset));
+  return depths;
+}
+
+// How far two pixels are apart at any depth: in transmittance, and in colour relative to the brightest channel.
+struct Distance {
+  double transmittance = 0, colour = 0;
+};
+
+Distance distanceOf(const DeepImage& a, const DeepImage& b, size_t pixel) {
+  Distance most;
+  double brightest = 0;
+  for (const char* name : {"R", "G", "B"}) {
+    const auto one = reference::mediaOf(a, pixel, name), other = reference::mediaOf(b, pixel, name);
+    brightest = std::max(brightest, reference::integrate(one).totalLight());
+    for (const double z : depthsOf(reference::together(one, other))) {
+      const auto seen = reference::integrate(one, 1, z), now = reference::integrate(other, 1, z);
+      most.transmittance = std::max(most.transmittance, std::abs(seen.transmittance - now.transmittance));
+      most.colour = std::max(most.colour, std::abs(seen.totalLight() - now.totalLight()));
+    }
+  }
+  if (brightest > 0) most.colour /= brightest;
+  return most;
+}
+
+TEST(Compress, IsWithinTheErrorAtEveryDepth) {
+  size_t before = 0, after = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const double error = seed % 3 == 0 ? 0.1 : seed % 3 == 1 ? 0.02 : 0.001;
+    DeepImage image = randomSamples(
+        {.window = {0, 0, 3, 3}, .seed = seed, .volumes = seed % 4 != 0, .most = 25, .sorted = seed % 5 != 0});
+    if (seed % 2)  // thin ones
+      for (const char* name : {"R", "G", "B", "A"})
+        for (float& value : image.get(name)) value *= 0.1f;
+    const DeepImage small = compress(image.copy(), {.error = error});
+    before += image.samples(), after += small.samples();
+    EXPECT_TRUE(isTidy(small)) << "seed " << seed;
+    for (size_t p = 0; p < image.pixels(); ++p) {
+      const Distance distance = distanceOf(image, small, p);
+      ASSERT_LE(distance.transmittance, error * 1.000001 + 1e-6) << "seed " << seed << ", pixel " << p;
+      ASSERT_LE(distance.colour, error * 1.000001 + 1e-6) << "seed " << seed << ", pixel " << p;
+    }
+  }
+  EXPECT_LT(after, before);
+  RecordProperty("before", int(before));
+  RecordProperty("after", int(after));
+}
+
+TEST(Compress, FlattensToTheSame) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const DeepImage image = randomSamples(
+        {.seed = seed, .volumes = seed % 3 != 0, .most = 30, .odd = seed % 2 == 0, .sorted = seed % 5 != 0});
+    const flat::Image whole = flatten(image), small = flatten(compress(image.copy(), {.error = 0.05}));
+    for (const char* name : {"R", "G", "B", "A"})
+      for (size_t i = 0; i < whole.get(name).values.size(); ++i) {
+        const float value = whole.get(name).values[i];
+        ASSERT_NEAR(small.get(name).values[i], value, 2e-6 * std::max(1.0f, std::abs(value)))
+            << name << ", seed " << seed;
+      }
+  }
+}
+
+// A volume cut into slices is one volume again.
+TEST(Compress, PutsSlicesTogether) {
+  reference::Pixels pixels(1);
+  for (int i = 0; i < 1000; ++i)
+    pixels[0].push_back(
+        {.z = 1 + 0.01f * float(i), .zBack = 1 + 0.01f * float(i + 1), .alpha = 0.01f, .colour = 0.002f});
+  const DeepImage small = compress(reference::makeDeep(pixels, 1), {});
+  const std::vector<reference::Sample> samples = reference::samplesOf(small, 0);
+  ASSERT_EQ(samples.size(), 1u);
+  EXPECT_EQ(samples[0].z, 1);
+  EXPECT_EQ(samples[0].zBack, pixels[0].back().zBack);
+  EXPECT_NEAR(samples[0].alpha, 1 - std::pow(0.99, 1000), 1e-6);
+}
+
+// An opaque volume that hides more behind it begins where a point is: it must not become one.
+TEST(Compress, PointsDoNotMeet) {
+  const DeepImage image = reference::makeDeep({{{.z = 1, .zBack = 1, .alpha = 0.5f, .colour = 0.25f},
+                                                {.z = 1, .zBack = 2, .alpha = 1, .colour = 1},
+                                                {.z = 3, .zBack = 3, .alpha = 1, .colour = 1}}},
+                                              1);
+  const DeepImage small = compress(image.copy(), {});
+  EXPECT_EQ(small.samples(), 2u);
+  EXPECT_EQ(flatten(small).get("R").values[0], 0.75f);
+}
+
+TEST(Compress, LeavesWhatIsFarApart) {
+  const DeepImage image = reference::makeDeep({{{.z = 1, .zBack = 1, .alpha = 0.5f, .colour = 0.25f, .id = 1},
+                                                {.z = 2, .zBack = 4, .alpha = 0.9f, .colour = 0.1f, .id = 2},
+                                                {.z = 5, .zBack = 5, .alpha = 1, .colour = 0.5f, .id = 3}}},
+                                              1);
+  EXPECT_EQ(reference::difference(compress(image.copy(), {}), image), "");
+}
+
+TEST(Compress, HardSurfacesStayWhereTheyAre) {
+  reference::Pixels pixels(1);
+  for (int i = 0; i < 9; ++i)
+    pixels[0].push_back({.z = 1 + float(i), .zBack = 0, .alpha = 2e-5f, .colour = 1e-5f, .id = uint32_t(i)});
+  pixels[0].push_back({.z = 12.5f, .zBack = 0, .alpha = 0.7f, .colour = 0.5f, .id = 77});
+  for (int i = 0; i < 9; ++i)
+    pixels[0].push_back({.z = 14 + float(i), .zBack = 0, .alpha = 2e-5f, .colour = 1e-5f, .id = uint32_t(i)});
+  const std::vector<reference::Sample> samples = reference::samplesOf(compress(reference::makeDeep(pixels, 1), {}), 0);
+  ASSERT_EQ(samples.size(), 1u);
+  EXPECT_EQ(samples[0].z, 12.5f);
+  EXPECT_EQ(samples[0].zBack, 12.5f);
+  EXPECT_EQ(samples[0].id, 77u);
+}
+
+TEST(Compress, WhatIsHiddenGoesAndEmissionStays) {
+  const DeepImage image = reference::makeDeep(
+      {{{.z = 1, .zBack = 1, .alpha = 1, .colour = 0.5f, .id = 5}, {.z = 2, .zBack = 2, .alpha = 0.5f, .colour = 9}},
+       {{.z = 1, .zBack = 1, .colour = 0.5f, .id = 5}, {.z = 2, .zBack = 2, .colour = 0.25f, .id = 6}}},
+      2);
+  const DeepImage small = compress(image.copy(), {});
+  ASSERT_EQ(small.samples(), 3u);
+  EXPECT_EQ(small.get("R")[0], 0.5f);
+  EXPECT_EQ(small.get("A")[0], 1);
+  EXPECT_EQ(small.find("id")->ids[0], 5u);
+  EXPECT_EQ(small.get("R")[2], 0.25f);
+}
+
+TEST(Compress, CameraSamplesAtOneDepthStayApartInTheFlattened) {
+  DeepImage image =
+      reference::makeDeep({{{.z = 1, .alpha = 0.5f, .colour = 0.5f}, {.z = 1, .alpha = 1, .colour = 0.1f}}}, 1, false);
+  image.attributes.set("fathom:spp", 2);
+  const DeepImage small = compress(image.copy(), {.error = 1e-6});
+  EXPECT_EQ(small.samples(), 1u);
+  EXPECT_NEAR(small.get("R")[0], 0.55f, 1e-6);
+}
+
+TEST(Compress, ThousandsOfSamplesInOnePixel) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> unit(0, 1);
+  reference::Pixels pixels(1);
+  for (int i = 0; i < 200000; ++i) {
+    const float alpha = 4e-5f * unit(random);
+    pixels[0].push_back({.z = 1 + unit(random), .zBack = 0, .alpha = alpha, .colour = alpha * unit(random)});
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const DeepImage small = compress(reference::makeDeep(pixels, 1), {});
+  EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 5) << "it is not n log n";
+  EXPECT_LT(small.samples(), 50u);
+  RecordProperty("samples", int(small.samples()));
+}
+
+TEST(Compress, TakesEmptyImagesAndRefusesWhatItCannot) {
+  DeepImage image = randomSamples({.seed = 1});
+  EXPECT_EQ(compress(rows(image, 4, 4), {}).samples(), 0u);
+  EXPECT_THROW(compress(image.copy(), {.error = 0}), Error);
+  EXPECT_THROW(compress(image.copy(), {.error = std::numeric_limits<double>::quiet_NaN()}), Error);
+  image.erase("G");
+  EXPECT_NO_THROW(compress(image.copy(), {}));
+  image.add("variance.R", PixelType::Float).values.fill(1);
+  EXPECT_FALSE(compress(image.copy(), {}).find("variance.R"));
+  image.erase("A");
+  EXPECT_THROW(compress(image.copy(), {}), Error);
+}
+
+}  // namespace
+}  // namespace fathom::deep
