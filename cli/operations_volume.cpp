@@ -1,7 +1,8 @@
-// Operations on what stands in front of what, and on volumes: holdout.
+// Operations on what stands in front of what, and on volumes: holdout, clip by a map, plus, deepen, fog.
 #include "cli/operation.h"
 #include "deep/clip.h"
 #include "deep/ops/deepen.h"
+#include "deep/ops/fog.h"
 #include "deep/ops/holdout.h"
 #include "deep/ops/plus.h"
 #include "flat/error.h"
@@ -59,6 +60,39 @@ Operation makeDeepen(const Arguments& arguments, std::span<const InputForm> inpu
   return {.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::deepen(flatOf(in[0]), params); }};
 }
 
+deep::FogParams fogParams(const Arguments& arguments) {
+  deep::FogParams params{
+      .near = arguments.number("near"), .far = arguments.number("far"), .density = arguments.number("density")};
+  const std::vector<double> colour = arguments.numbers("colour");
+  if (colour.size() != 3) fail("fog: colour: expected three numbers, found {}", arguments.text("colour"));
+  std::copy(colour.begin(), colour.end(), params.colour.begin());
+  if (arguments.has("fov")) params.fieldOfView = float(arguments.number("fov"));
+  if (!arguments.has("height")) return params;
+  const std::string& up = arguments.text("up");
+  params.height = deep::FogHeight{.height = arguments.number("height"),
+                                  .falloff = arguments.number("falloff"),
+                                  .up = up == "x" ? deep::Axis::X : (up == "y" ? deep::Axis::Y : deep::Axis::Z),
+                                  .slabs = arguments.whole("slabs")};
+  return params;
+}
+
+Operation makeFog(const Arguments& arguments, std::span<const InputForm> inputs) {
+  const deep::FogParams params = fogParams(arguments);
+  const bool applies = arguments.flag("apply");
+  const deep::DeepImage& form = deepOf(inputs[0].image);
+  deep::fogVolumes(form, params);  // throws where they do not do
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    deep::DeepImage& image = deepOf(in[0]);
+    return applies ? deep::applyFog(std::move(image), params) : deep::insertFog(std::move(image), params);
+  };
+  if (!deep::ViewRays(form.attributes, form.displayWindow, params.fieldOfView, deep::Axis::Y).hasScale())
+    operation.summary = []() -> std::vector<std::string> {
+      return {"the field of view is not known: fog is as thick at the borders of the frame as in its middle (see fov)"};
+    };
+  return operation;
+}
+
 }  // namespace
 
 void addVolumeOperations(std::vector<OperationSpec>& table) {
@@ -113,6 +147,25 @@ void addVolumeOperations(std::vector<OperationSpec>& table) {
                      false,
                      {"opacity", "extinction"}}},
                    makeDeepen});
+  table.push_back(
+      {"fog",
+       "Fog between two depths: as volumes among the samples, or applied to them. With a height it lies on "
+       "the ground and thins out above.",
+       {Deep},
+       false,
+       {{"density", Type::Number, "", "how much light a unit of length takes away (extinction)", true},
+        {"far", Type::Number, "", "the depth where it ends", true},
+        {"near", Type::Number, "0", "the depth where it begins"},
+        {"colour", Type::Numbers, "0.5,0.5,0.5", "red, green and blue of fog that nothing is seen through"},
+        {"height", Type::Number, "", "up to here, in the world, it is dense; needs the camera's attributes"},
+        {"falloff", Type::Number, "1", "how far above the height a third of it is left (1/e)"},
+        {"up", Type::Text, "y", "the axis of the world that height is along", false, {"x", "y", "z"}},
+        {"slabs", Type::Whole, "16", "volumes per pixel for fog with a height"},
+        {"fov", Type::Number, "", "horizontal field of view in degrees, where the file does not have it"},
+        {"apply", Type::Flag, "0",
+         "fade the samples themselves: few samples, but nothing can be put into "
+         "this fog any more"}},
+       makeFog});
 }
 
 }  // namespace fathom::cli

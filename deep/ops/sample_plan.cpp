@@ -31,7 +31,7 @@ float valueOf(const RowPlan& row, size_t i, Role role, bool back, const Buffer<f
     case Role::Alpha:
       return sample.alpha;
     case Role::Statistic:
-      return values[largest(shares).sample];
+      return shares.empty() ? 0 : values[largest(shares).sample];
     default:
       return mixed(shares, role, values);
   }
@@ -41,7 +41,10 @@ void fillRow(const RowPlan& row, const Channel& from, size_t at, Channel& to) {
   const Role role = roleOf(from);
   const bool back = from.name == "ZBack";
   if (role == Role::Identifier)
-    for (size_t i = 0; i < row.samples(); ++i) to.ids[at + i] = from.ids[largest(row.shares(i)).sample];
+    for (size_t i = 0; i < row.samples(); ++i) {
+      const std::span<const RowPlan::Share> shares = row.shares(i);
+      to.ids[at + i] = shares.empty() ? 0 : from.ids[largest(shares).sample];
+    }
   else
     for (size_t i = 0; i < row.samples(); ++i) to.values[at + i] = valueOf(row, i, role, back, from.values);
 }

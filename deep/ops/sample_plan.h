@@ -38,7 +38,7 @@ class RowPlan {
   void change(uint64_t sample, float z, float zBack, float alpha, float weight) {
     add({sample, weight, 1}, false, z, zBack, alpha);
   }
-  // One made of several; `shares` are copied.
+  // One made of several; `shares` are copied. Without any its values are 0, and only its depths and alpha say something.
   void mix(std::span<const Share> shares, float z, float zBack, float alpha);
 
   size_t pixels() const { return ends_.size(); }
