@@ -1,6 +1,7 @@
 // Operations that pass samples on, or decide which of them stay: merge, clip, crop, tidy, flatten.
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 
@@ -11,6 +12,7 @@
 #include "deep/ops/crop.h"
 #include "deep/ops/merge.h"
 #include "deep/tidy.h"
+#include "flat/error.h"
 
 namespace fathom::cli {
 
@@ -103,12 +105,24 @@ Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
   return operation;
 }
 
-Operation makeFlatten(const Arguments&, std::span<const InputForm>) {
+// In the order of deep::FlatDepth.
+const std::vector<std::string> kDepths = {"mean", "front", "back", "transmittance"};
+
+deep::FlatDepth flatDepth(const std::string& name) {
+  const auto found = std::ranges::find(kDepths, name);
+  if (found == kDepths.end()) fail("flatten: depths: expected {}, found {}", fmt::join(kDepths, ", "), name);
+  return deep::FlatDepth(found - kDepths.begin());
+}
+
+Operation makeFlatten(const Arguments& arguments, std::span<const InputForm>) {
+  deep::FlattenParams params{flatDepth(arguments.text("z")), {}, arguments.number("at")};
+  if (arguments.has("depths"))
+    for (const std::string& name : arguments.words("depths")) params.depths.push_back(flatDepth(name));
   const auto nonFinite = std::make_shared<std::atomic<uint64_t>>(0);
   Operation operation;
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
     *nonFinite += deep::countNonFinite(deepOf(in[0]));
-    return deep::flatten(deepOf(in[0]));
+    return deep::flatten(deepOf(in[0]), params);
   };
   operation.summary = [=]() -> std::vector<std::string> {
     if (*nonFinite == 0) return {};
@@ -151,10 +165,15 @@ void addSampleOperations(std::vector<OperationSpec>& table) {
        {},
        makeTidy});
   table.push_back({"flatten",
-                   "Composite the samples into a flat image. Z becomes the mean depth of what is seen.",
+                   "Composite the samples into a flat image.",
                    {Deep},
                    false,
-                   {},
+                   {{"z", Type::Text, "mean",
+                     "the depth in Z: mean (of all that is seen), front, back, or transmittance (where the light that "
+                     "passes falls to `at`)",
+                     false, kDepths},
+                    {"at", Type::Number, "0.5", "how much light passes at the depth `transmittance`: 0 to 1"},
+                    {"depths", Type::Text, "", "further channels, like front,back: Z.front and Z.back"}},
                    makeFlatten});
 }
 

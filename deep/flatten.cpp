@@ -3,127 +3,144 @@
 #include "deep/flatten.h"
 
 #include <algorithm>
-#include <limits>
-#include <vector>
+#include <array>
+#include <string>
 
 #include "deep/channels.h"
 #include "deep/flat_attributes.h"
-#include "deep/pixel_pieces.h"
+#include "deep/row_weights.h"
+#include "flat/error.h"
 #include "flat/parallel.h"
 
 namespace fathom::deep {
 
 namespace {
 
-// How one row's pixels are made of its samples.
-struct RowWeights {
-  std::vector<double> premultiplied;  // per sample, the factor of premultiplied values
-  std::vector<double> plain;          // per sample, the factor of other values: its part of what is seen of the pixel
-  std::vector<float> alpha, z;        // per pixel
-};
+constexpr int kRows = 8;  // of a tile; its scratch is allocated once
 
-// What compositing pieces front to back adds up.
-struct Pixel {
-  double passed = 1;  // transmittance so far
-  double alpha = 0;
-  double depth = 0, depthAlpha = 0;  // of the pieces at a finite depth
-  float nearest = std::numeric_limits<float>::infinity();
-
-  // Returns the transmittance in front of the piece.
-  double put(const Range& range, double pieceAlpha) {
-    const double front = passed, seen = front * pieceAlpha, middle = range.middle();
-    nearest = std::min(nearest, range.z);
-    alpha += seen;
-    if (std::isfinite(middle)) {
-      depth += seen * middle;
-      depthAlpha += seen;
-    }
-    passed *= 1 - pieceAlpha;
-    return front;
-  }
-  float z() const { return depthAlpha > 0 ? float(depth / depthAlpha) : nearest; }
-};
-
-struct Source {
-  const DeepImage& image;
-  std::span<const float> alpha, z, zBack;
-  bool mergePoints;
-
-  std::span<const float> of(std::span<const float> values, size_t pixel) const {
-    return values.empty() ? values : values.subspan(image.offsets[pixel], image.count(pixel));
-  }
-};
-
-// Composites the pixel whose samples start at `first` in the row.
-void decide(const Source& source, size_t pixel, size_t first, PixelPieces& pieces, RowWeights& row) {
-  const std::span<const float> alpha = source.of(source.alpha, pixel);
-  pieces.set(source.of(source.z, pixel), source.of(source.zBack, pixel));
-  checkOverlaps(pieces.size(source.mergePoints), source.image.dataWindow, pixel);
-  Pixel sum;
-  pieces.visit(alpha, source.mergePoints, [&](const Piece& piece) {
-    const double front = sum.put(piece.range, piece.alpha);
-    for (const Share& share : piece.shares) {
-      row.premultiplied[first + share.sample] += front * share.weight;
-      row.plain[first + share.sample] += front * piece.alpha * share.part;
-    }
-  });
-  for (size_t i = first; i < first + alpha.size(); ++i) row.plain[i] = sum.alpha > 0 ? row.plain[i] / sum.alpha : 0;
-  row.alpha.push_back(float(sum.alpha));
-  row.z.push_back(alpha.empty() ? 0 : sum.z());
-}
-
-RowWeights decideRow(const Source& source, size_t firstPixel, size_t endPixel) {
-  const DeepImage& image = source.image;
-  const size_t begin = image.offsets[firstPixel], samples = image.offsets[endPixel] - begin;
-  RowWeights row{std::vector<double>(samples), std::vector<double>(samples), {}, {}};
-  PixelPieces pieces;
-  for (size_t pixel = firstPixel; pixel < endPixel; ++pixel)
-    decide(source, pixel, image.offsets[pixel] - begin, pieces, row);
-  return row;
-}
-
-// `offsets` are those of the row's pixels.
-void apply(const std::vector<double>& weights, const uint64_t* offsets, std::span<const float> values,
-           std::span<float> out) {
-  for (size_t x = 0; x < out.size(); ++x) {
-    double sum = 0;
-    for (size_t i = offsets[x]; i < offsets[x + 1]; ++i)
-      sum += weights[i - offsets[0]] * double(finiteOrZero(values[i]));
-    out[x] = float(sum);
+float PixelDepths::*memberOf(FlatDepth depth) {
+  switch (depth) {
+    case FlatDepth::Front:
+      return &PixelDepths::front;
+    case FlatDepth::Back:
+      return &PixelDepths::back;
+    case FlatDepth::Transmittance:
+      return &PixelDepths::passing;
+    default:
+      return &PixelDepths::mean;
   }
 }
 
-bool hasFlatForm(const Channel& channel) {
+std::string channelOf(FlatDepth depth) {
+  switch (depth) {
+    case FlatDepth::Front:
+      return "Z.front";
+    case FlatDepth::Back:
+      return "Z.back";
+    case FlatDepth::Transmittance:
+      return "Z.transmittance";
+    default:
+      return "Z.mean";
+  }
+}
+
+bool hasFlatForm(const Channel& channel, const FlattenParams& params) {
   const Role role = roleOf(channel);
-  return role != Role::Statistic && role != Role::Identifier && channel.name != "ZBack";
+  return role != Role::Statistic && role != Role::Identifier && channel.name != "ZBack" &&
+         std::ranges::find(params.depths, channel.name, channelOf) == params.depths.end();
+}
+
+// A plane of the result and what it is made of.
+struct Sum {
+  const float* values;  // per sample
+  float* out;           // per pixel
+};
+struct Depth {
+  float PixelDepths::*which;
+  float* out;
+};
+struct Outputs {
+  std::vector<Sum> composited, means;
+  std::vector<Depth> depths;
+  float* alpha = nullptr;
+};
+
+// Adds the planes to `result`, in the order of the channels.
+Outputs planOutputs(const DeepImage& image, const FlattenParams& params, flat::Image& result) {
+  Outputs outputs;
+  const auto add = [&](const std::string& name) {
+    result.planes.push_back({name, Buffer<float>(result.dataWindow.area())});
+    return result.planes.back().values.data();
+  };
+  for (const Channel& channel : image.channels) {
+    if (!hasFlatForm(channel, params)) continue;
+    const Role role = roleOf(channel);
+    float* out = add(channel.name);
+    if (role == Role::Alpha)
+      outputs.alpha = out;
+    else if (role == Role::Depth)
+      outputs.depths.push_back({memberOf(params.z), out});
+    else
+      (role == Role::Plain ? outputs.means : outputs.composited).push_back({channel.values.data(), out});
+  }
+  for (const FlatDepth depth : params.depths)
+    if (!result.find(channelOf(depth))) outputs.depths.push_back({memberOf(depth), add(channelOf(depth))});
+  return outputs;
+}
+
+// A row of pixels, the first one's number in the image, and where their samples begin.
+struct Row {
+  const RowWeights& weights;
+  size_t first, width;
+  const uint64_t* offsets;
+};
+
+constexpr size_t kTogether = 3;  // channels that are summed at once: a colour
+
+void composite(const Row& row, const std::array<Sum, kTogether>& sums) {
+  const double* weights = row.weights.premultiplied.data();
+  const uint64_t begin = row.offsets[0];
+  for (size_t x = 0; x < row.width; ++x) {
+    std::array<double, kTogether> total = {};
+    for (size_t i = row.offsets[x]; i < row.offsets[x + 1]; ++i)
+      for (size_t c = 0; c < kTogether; ++c) total[c] += weights[i - begin] * double(finiteOrZero(sums[c].values[i]));
+    for (size_t c = 0; c < kTogether; ++c) sums[c].out[row.first + x] = float(total[c]);
+  }
+}
+
+void average(const Row& row, const Sum& sum) {
+  for (size_t x = 0; x < row.width; ++x) {
+    const double alpha = row.weights.alpha[x];
+    double total = 0;
+    for (size_t i = row.offsets[x]; i < row.offsets[x + 1] && alpha > 0; ++i)
+      total += row.weights.seen[i - row.offsets[0]] / alpha * double(finiteOrZero(sum.values[i]));
+    sum.out[row.first + x] = float(total);
+  }
+}
+
+void write(const Row& row, const Outputs& outputs) {
+  const auto at = [&](size_t i) { return outputs.composited[std::min(i, outputs.composited.size() - 1)]; };
+  for (size_t i = 0; i < outputs.composited.size(); i += kTogether) composite(row, {at(i), at(i + 1), at(i + 2)});
+  for (const Sum& sum : outputs.means) average(row, sum);
+  for (size_t x = 0; x < row.width; ++x) outputs.alpha[row.first + x] = float(row.weights.alpha[x]);
+  for (const Depth& depth : outputs.depths)
+    for (size_t x = 0; x < row.width; ++x) depth.out[row.first + x] = row.weights.depths[x].*depth.which;
 }
 
 }  // namespace
 
-flat::Image flatten(const DeepImage& image) {
-  const Source source{image, image.get("A"), image.get("Z"), image.tryGet("ZBack"), !holdsStatistics(image)};
+flat::Image flatten(const DeepImage& image, const FlattenParams& params) {
+  if (!(params.transmittance >= 0 && params.transmittance < 1))
+    fail("flatten: transmittance: expected at least 0 and below 1, found {}", params.transmittance);
+  const bool ends = params.z != FlatDepth::Mean || !params.depths.empty();
+  (void)RowCompositor(image);  // throws for images without rows, too
   flat::Image result{image.dataWindow, image.displayWindow, {}, flatAttributes(image.attributes)};
-  std::vector<const Channel*> channels;
-  for (const Channel& channel : image.channels)
-    if (hasFlatForm(channel)) {
-      channels.push_back(&channel);
-      result.add(channel.name);
-    }
+  const Outputs outputs = planOutputs(image, params, result);
   const size_t width = size_t(image.dataWindow.width());
-  parallelFor(0, image.dataWindow.height(), [&](int y) {
-    const size_t first = size_t(y) * width;
-    const RowWeights row = decideRow(source, first, first + width);
-    for (size_t c = 0; c < channels.size(); ++c) {
-      const std::span<float> out{result.planes[c].values.data() + first, width};
-      const Role role = roleOf(*channels[c]);
-      if (role == Role::Alpha)
-        std::copy(row.alpha.begin(), row.alpha.end(), out.begin());
-      else if (role == Role::Depth)
-        std::copy(row.z.begin(), row.z.end(), out.begin());
-      else
-        apply(role == Role::Plain ? row.plain : row.premultiplied, image.offsets.data() + first, channels[c]->values,
-              out);
-    }
+  parallelRanges(0, image.dataWindow.height(), kRows, [&](int y0, int y1) {
+    RowCompositor compositor(image, ends, params.transmittance);
+    for (size_t first = size_t(y0) * width; first < size_t(y1) * width; first += width)
+      write({compositor.composite(first, first + width), first, width, image.offsets.data() + first}, outputs);
   });
   return result;
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cfloat>
-#include <limits>
 
 namespace fathom::deep {
 
@@ -21,11 +20,6 @@ void mergeClear(std::span<double> weights, std::span<double> shares) {
 }
 
 }  // namespace
-
-Range usableRange(float z, float zBack) {
-  if (std::isnan(z)) return {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity()};
-  return zBack > z && std::isfinite(z) && std::isfinite(zBack) ? Range{z, zBack} : Range{z, z};
-}
 
 Part partOf(double alpha, double fraction) {
   if (alpha == 1) return {1, 1};

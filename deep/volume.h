@@ -5,6 +5,7 @@
 // multiplied with.
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "flat/finite.h"
@@ -13,7 +14,8 @@ namespace fathom::deep {
 
 // What compositing makes of an alpha that a file may hold: NaN is 0, and the rest is brought into [0,1].
 inline double opacity(float alpha) {
-  return alpha > 0 ? (alpha < 1 ? double(alpha) : 1.0) : 0.0;
+  const float positive = alpha > 0 ? alpha : 0.0f;
+  return double(positive < 1 ? positive : 1.0f);
 }
 
 // Depths as compositing takes them. A range that is not finite or not positive in length is a point at `z`; a depth
@@ -22,10 +24,15 @@ struct Range {
   float z, zBack;  // z == zBack: a point
 
   bool isPoint() const { return z == zBack; }
-  double middle() const { return isPoint() ? double(z) : (double(z) + double(zBack)) / 2; }
+  double middle() const { return (double(z) + double(zBack)) / 2; }
   bool operator==(const Range&) const = default;
 };
-Range usableRange(float z, float zBack);
+inline Range usableRange(float z, float zBack) {
+  const float end = zBack > z ? zBack : z;
+  if (std::isfinite(z) && std::isfinite(end)) return {z, end};
+  const float point = std::isnan(z) ? std::numeric_limits<float>::infinity() : z;
+  return {point, point};
+}
 
 // A part of a volume: its alpha, and the factor between the whole's premultiplied values and the part's.
 struct Part {
