@@ -22,7 +22,7 @@ struct ReadOptions {
 Image read(const std::string& path, const ReadOptions& options = {});
 
 struct WriteOptions {
-  bool half = false;  // HALF channels, but depths, counts and variances, which need the range, stay FLOAT
+  bool half = false;  // HALF channels; depths, counts, variances and Cryptomatte layers need the range and stay FLOAT
 };
 
 // Writes a zip-compressed EXR with all planes and attributes. It stands at `path` only when complete.

@@ -8,6 +8,7 @@
 #include <memory>
 #include <new>
 
+#include "flat/attribute_text.h"
 #include "flat/error.h"
 #include "flat/oiio/attributes.h"
 
@@ -115,8 +116,19 @@ void interleave(const Image& image, int y0, int y1, std::vector<float>& values) 
   }
 }
 
-bool needsRange(std::string_view name) {
-  return name == "Z" || name == "ZBack" || name.ends_with("samples") || name.find("variance") != name.npos;
+// Ids and coverages of a Cryptomatte layer, NAME00.R and so on: ids are bits of a float.
+bool isCryptomatte(const Image& image, std::string_view name) {
+  return std::ranges::any_of(image.attributes, [&](const auto& attribute) {
+    if (!attribute.first.starts_with("cryptomatte/") || !attribute.first.ends_with("/name")) return false;
+    const AttributeValue value = parseAttribute(attribute.second);
+    const auto* layer = std::get_if<std::string>(&value);
+    return layer && name.starts_with(*layer);
+  });
+}
+
+bool needsRange(const Image& image, std::string_view name) {
+  return name == "Z" || name.starts_with("Z.") || name == "ZBack" || name.ends_with("samples") ||
+         name.find("variance") != name.npos || isCryptomatte(image, name);
 }
 
 void writeBands(OIIO::ImageOutput& output, const OIIO::ImageSpec& spec, const Image& image) {
@@ -180,7 +192,7 @@ std::vector<uint8_t> encodeExr(const Image& image, const WriteOptions& options) 
   if (!spec.find_attribute("DateTime")) spec.attribute("DateTime", "");
   if (options.half)
     for (const std::string& name : spec.channelnames)
-      spec.channelformats.push_back(needsRange(name) ? OIIO::TypeFloat : OIIO::TypeHalf);
+      spec.channelformats.push_back(needsRange(image, name) ? OIIO::TypeFloat : OIIO::TypeHalf);
   return encode("openexr", spec, image);
 }
 
