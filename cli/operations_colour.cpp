@@ -44,7 +44,7 @@ std::vector<std::string> describeNew(const deep::DeepImage& before, const deep::
 std::array<float, 3> perComponent(const Arguments& arguments, const std::string& name) {
   const std::vector<double> numbers = arguments.numbers(name);
   if (numbers.size() == 1) return {float(numbers[0]), float(numbers[0]), float(numbers[0])};
-  if (numbers.size() != 3) fail("grade: {}: expected one number or three, found {}", name, numbers.size());
+  if (numbers.size() != 3) fail("{}: expected one number or three, found {}", name, numbers.size());
   return {float(numbers[0]), float(numbers[1]), float(numbers[2])};
 }
 
@@ -66,7 +66,7 @@ Operation makeGrade(const Arguments& arguments, std::span<const InputForm> input
   const deep::DeepImage& form = deepOf(inputs[0].image);
   const deep::DeepImage graded = deep::grade(form.copy(), params);
   std::vector<std::string> lines = describeDropped(form, graded);
-  const auto changed = deep::channelsNamed("grade", params.channels, deep::floatChannels(form));
+  const auto changed = deep::channelsNamed(params.channels, deep::floatChannels(form));
   const bool components = std::ranges::any_of(deep::floatChannels(form), isComponent);
   if (components && std::ranges::any_of(changed, isComponent) != (std::ranges::find(changed, "R") != changed.end()))
     lines.emplace_back("R G B and its components (diffuse, specular) were not graded alike: their sum is another now");

@@ -143,7 +143,7 @@ class PixelCompression {
 }  // namespace
 
 DeepImage compress(DeepImage image, const CompressParams& params) {
-  if (!(params.error > 0)) fail("compress: error: expected a number above 0, found {}", params.error);
+  if (!(params.error > 0)) fail("error: expected a number above 0, found {}", params.error);
   const bool mergePoints = !holdsStatistics(image);
   dropSampleStatistics(image);
   const Source source(image, mergePoints, params.error);

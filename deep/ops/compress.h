@@ -19,9 +19,9 @@ struct CompressParams {
 // Samples that stay alone pass bit for bit, if their depths are usable; the others are first made tidy, as flattening
 // does it. All premultiplied channels are composited into the new samples, but R, G and B alone (0 where missing) are
 // held to the error; the id is that of the sample with the largest part of its alpha. Statistics and half buffers are
-// left out, always. Two cases are outside of the error: volumes of an alpha below 1 which rounds to 1 once they overlap,
-// and samples that differ by less than FLOAT can tell. Halo 0. Throws Error when A or Z is missing, when R, G or B is
-// UINT, when the error is not above 0, and where volumes overlap too much (see `tidy`).
+// left out, always. Two things are outside of the error: overlapping volumes whose alpha together rounds to 1, which are
+// opaque from their front on, and what a file rounds where alpha or colours are HALF. Halo 0. Throws Error when A or Z
+// is missing, when R, G or B is UINT, when the error is not above 0, and where volumes overlap too much (see `tidy`).
 DeepImage compress(DeepImage image, const CompressParams& params);
 
 }  // namespace fathom::deep

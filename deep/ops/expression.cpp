@@ -55,13 +55,13 @@ void checkNames(const DeepImage& image, const std::vector<Assignment>& assignmen
   std::vector<std::string> known(kPlaces.begin(), kPlaces.end());
   for (const Channel& channel : image.channels) known.push_back(channel.name);
   for (const Assignment& assignment : assignments) {
-    if (isPlace(assignment.target)) fail("expression: expected a channel to set, found {}", assignment.target);
+    if (isPlace(assignment.target)) fail("expected a channel to set, found {}", assignment.target);
     for (const std::string& name : namesIn(assignment)) {
       if (std::ranges::find(known, name) != known.end()) continue;
       std::string all;
       for (const std::string& one : known) all.append(1, ' ').append(printable(one));
-      fail("expression: expected a channel or a function at character {}, found {}; there are{}",
-           placeOf(assignment, name), name, all);
+      fail("expected a channel or a function at character {}, found {}; there are{}", placeOf(assignment, name), name,
+           all);
     }
     known.push_back(assignment.target);
   }

@@ -50,7 +50,7 @@ mu::Parser parserOf(const Assignment& assignment) {
 // The library's message without the place in its own terms, for a line that names the place.
 std::string messageOf(const mu::Parser::exception_type& error) {
   if (error.GetCode() == mu::ecINTERNAL_ERROR) return "an operator lacks a value";
-  const std::string text = error.GetMsg();
+  const std::string& text = error.GetMsg();
   const size_t end =
       std::min({text.size(), text.find(" found at"), text.find(" at position"), text.find(" at expression position")});
   return oneLine(text.substr(0, end));
@@ -66,8 +66,8 @@ std::string trimmed(std::string_view text) {
 
 [[noreturn]] void refuse(const Assignment& assignment, const mu::Parser::exception_type& error) {
   const size_t length = assignment.formula.size(), at = size_t(std::max(error.GetPos(), 0));
-  fail("expression: {} = {}: {}, at character {}", assignment.target, trimmed(assignment.formula),
-       printable(messageOf(error)), assignment.at + std::min(at, length) + 1);
+  fail("{} = {}: {}, at character {}", assignment.target, trimmed(assignment.formula), printable(messageOf(error)),
+       assignment.at + std::min(at, length) + 1);
 }
 
 // The first = that is not part of a comparison.
@@ -85,14 +85,12 @@ size_t findAssign(std::string_view text) {
 Assignment parseAssignment(std::string_view text, size_t at) {
   const size_t assign = findAssign(text);
   if (assign == std::string_view::npos)
-    fail("expression: expected CHANNEL = FORMULA at character {}, found {}", at + 1, trimmed(text));
+    fail("expected CHANNEL = FORMULA at character {}, found {}", at + 1, trimmed(text));
   const std::string target = trimmed(text.substr(0, assign)), formula(text.substr(assign + 1));
-  if (!isName(target))
-    fail("expression: expected the name of a channel at character {}, found {}", at + 1, trimmed(text));
+  if (!isName(target)) fail("expected the name of a channel at character {}, found {}", at + 1, trimmed(text));
   const size_t second = findAssign(formula);
   if (second != std::string_view::npos)
-    fail("expression: expected one = in {}, found another at character {}", trimmed(text),
-         at + assign + 1 + second + 1);
+    fail("expected one = in {}, found another at character {}", trimmed(text), at + assign + 1 + second + 1);
   return {target, formula, at + assign + 1};
 }
 
@@ -106,7 +104,7 @@ std::vector<Assignment> parseAssignments(std::string_view text) {
     if (!trimmed(one).empty()) result.push_back(parseAssignment(one, at));
     at = end + 1;
   }
-  if (result.empty()) fail("expression: expected CHANNEL = FORMULA, found nothing");
+  if (result.empty()) fail("expected CHANNEL = FORMULA, found nothing");
   return result;
 }
 
@@ -131,11 +129,13 @@ size_t placeOf(const Assignment& assignment, const std::string& name) {
 }
 
 struct Formula::Parser {
+  explicit Parser(const Assignment& assignment) : parser(parserOf(assignment)) {}
+
   mu::Parser parser;
 };
 
 Formula::Formula(const Assignment& assignment, std::span<const std::string> names, std::span<double> values)
-    : parser_(std::make_unique<Parser>(parserOf(assignment))) {
+    : parser_(std::make_unique<Parser>(assignment)) {
   try {
     for (size_t i = 0; i < names.size(); ++i) parser_->parser.DefineVar(names[i], &values[i]);
     parser_->parser.Eval();
@@ -143,7 +143,7 @@ Formula::Formula(const Assignment& assignment, std::span<const std::string> name
     refuse(assignment, error);
   }
   if (const int results = parser_->parser.GetNumResults(); results != 1)
-    fail("expression: {} = {}: expected one value, found {}", assignment.target, trimmed(assignment.formula), results);
+    fail("{} = {}: expected one value, found {}", assignment.target, trimmed(assignment.formula), results);
 }
 
 Formula::Formula(Formula&&) noexcept = default;

@@ -24,7 +24,7 @@ using Triple = std::array<float*, 3>;
 size_t component(const std::string& channel) {
   const size_t at = std::string_view("RGB").find(channel.back());
   const bool last = channel.size() == 1 || channel[channel.size() - 2] == '.';
-  if (at == std::string_view::npos || !last) fail("grade: expected channels R, G and B, found {}", channel);
+  if (at == std::string_view::npos || !last) fail("expected channels R, G and B, found {}", channel);
   return at;
 }
 
@@ -40,7 +40,7 @@ std::vector<Triple> triplesOf(DeepImage& image, const std::vector<std::string>& 
   }
   for (size_t i = 0; i < triples.size(); ++i)
     for (size_t c = 0; whole && c < 3; ++c)
-      if (!triples[i][c]) fail("grade: saturation: expected channel {}{} among those to grade", layers[i], "RGB"[c]);
+      if (!triples[i][c]) fail("saturation: expected channel {}{} among those to grade", layers[i], "RGB"[c]);
   return triples;
 }
 
@@ -90,14 +90,14 @@ void store(const Samples& samples, const Block& graded, float* values) {
 
 void check(const GradeParams& params) {
   for (const float gamma : params.gamma)
-    if (!(gamma > 0)) fail("grade: gamma: expected numbers above 0, found {}", gamma);
+    if (!(gamma > 0)) fail("gamma: expected numbers above 0, found {}", gamma);
 }
 
 }  // namespace
 
 DeepImage grade(DeepImage image, const GradeParams& params) {
   check(params);
-  const std::vector<std::string> channels = channelsNamed("grade", params.channels, floatChannels(image));
+  const std::vector<std::string> channels = channelsNamed(params.channels, floatChannels(image));
   for (const std::string& name : statisticsOf(image, channels)) image.erase(name);
   const std::vector<Triple> triples = triplesOf(image, channels, params.saturation != 1);
   const std::span<const float> alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");

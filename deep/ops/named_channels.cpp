@@ -14,8 +14,7 @@ bool holds(std::span<const std::string> names, const std::string& name) {
 
 }  // namespace
 
-std::vector<std::string> channelsNamed(std::string_view operation, std::span<const std::string> names,
-                                       std::span<const std::string> available) {
+std::vector<std::string> channelsNamed(std::span<const std::string> names, std::span<const std::string> available) {
   std::vector<std::string> result;
   for (const std::string& name : names) {
     bool found = false;
@@ -27,7 +26,7 @@ std::vector<std::string> channelsNamed(std::string_view operation, std::span<con
     if (found) continue;
     std::string all;
     for (const std::string& channel : available) all.append(1, ' ').append(printable(channel));
-    fail("{}: expected a channel or a layer, found {}; there are{}", operation, name.empty() ? "no name" : name,
+    fail("expected a channel or a layer, found {}; there are{}", name.empty() ? "no name" : name,
          all.empty() ? " none" : all);
   }
   return result;

@@ -3,7 +3,6 @@
 
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "deep/image.h"
@@ -11,10 +10,9 @@
 namespace fathom::deep {
 
 // The channels that `names` stand for, each once, in the order of `names` and `available`: a name is a channel, or a
-// layer, which is all channels that begin with it and a dot. Throws Error, opening with `operation`, for a name that is
+// layer, which is all channels that begin with it and a dot. Throws Error for a name that is
 // neither.
-std::vector<std::string> channelsNamed(std::string_view operation, std::span<const std::string> names,
-                                       std::span<const std::string> available);
+std::vector<std::string> channelsNamed(std::span<const std::string> names, std::span<const std::string> available);
 
 // The names of all channels but those of type UINT.
 std::vector<std::string> floatChannels(const DeepImage& image);

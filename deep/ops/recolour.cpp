@@ -28,10 +28,9 @@ float valueAt(const flat::Image& image, const flat::Plane& plane, int x, int y) 
 std::vector<std::string> planesNamed(const flat::Image& flat, const RecolourParams& params) {
   std::vector<std::string> available;
   for (const flat::Plane& plane : flat.planes) available.push_back(plane.name);
-  std::vector<std::string> names = channelsNamed("recolour", params.channels, available);
+  std::vector<std::string> names = channelsNamed(params.channels, available);
   for (const std::string& name : names)
-    if (roleOf(name, PixelType::Float) != Role::Premultiplied)
-      fail("recolour: expected channels of colour, found {}", name);
+    if (roleOf(name, PixelType::Float) != Role::Premultiplied) fail("expected channels of colour, found {}", name);
   return names;
 }
 
@@ -113,8 +112,7 @@ DeepImage recolour(DeepImage deep, const flat::Image& flat, const RecolourParams
   std::vector<Channel*> recoloured, others;
   for (Channel& channel : deep.channels) {
     const bool named = std::ranges::find(names, channel.name) != names.end();
-    if (named && channel.type == PixelType::Uint)
-      fail("recolour: channel {}: expected a colour, found UINT", channel.name);
+    if (named && channel.type == PixelType::Uint) fail("channel {}: expected a colour, found UINT", channel.name);
     if (named) recoloured.push_back(&channel);
     if (!named && params.matte && roleOf(channel) == Role::Premultiplied) others.push_back(&channel);
   }

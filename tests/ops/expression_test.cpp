@@ -103,13 +103,13 @@ TEST(Expression, DropsWhatTheNewValuesVoid) {
 
 TEST(Expression, TellsWhatIsWrongAndWhere) {
   const DeepImage image = rows(randomSamples({.seed = 1}), 3, 3);
-  EXPECT_EQ(errorOf(image, "G = G; R = R*(2"), "expression: R = R*(2: Missing parenthesis, at character 16");
+  EXPECT_EQ(errorOf(image, "G = G; R = R*(2"), "R = R*(2: Missing parenthesis, at character 16");
   EXPECT_EQ(errorOf(image, "R = G + depth*2"),
-            "expression: expected a channel or a function at character 9, found depth; there are x y i n R G B A Z id");
-  EXPECT_EQ(errorOf(image, "R*2"), "expression: expected CHANNEL = FORMULA at character 1, found R*2");
-  EXPECT_EQ(errorOf(image, " ;"), "expression: expected CHANNEL = FORMULA, found nothing");
-  EXPECT_EQ(errorOf(image, "R = G = 2"), "expression: expected one = in R = G = 2, found another at character 7");
-  EXPECT_EQ(errorOf(image, "x = 2"), "expression: expected a channel to set, found x");
+            "expected a channel or a function at character 9, found depth; there are x y i n R G B A Z id");
+  EXPECT_EQ(errorOf(image, "R*2"), "expected CHANNEL = FORMULA at character 1, found R*2");
+  EXPECT_EQ(errorOf(image, " ;"), "expected CHANNEL = FORMULA, found nothing");
+  EXPECT_EQ(errorOf(image, "R = G = 2"), "expected one = in R = G = 2, found another at character 7");
+  EXPECT_EQ(errorOf(image, "x = 2"), "expected a channel to set, found x");
   EXPECT_NE(errorOf(image, "R = 1, 2"), "");
   for (const char* text :
        {"R =", "R = *", "R = R*+", "R = \"a\"", "R = R R", "R = sin()", "R = a(3)", "R == 2", "2 = R", "R = @",
