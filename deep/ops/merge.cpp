@@ -153,19 +153,35 @@ DeepImage merge(std::span<const DeepImage> images) {
   return result;
 }
 
+namespace {
+
+// "diffuse.*" for diffuse.R: what the user ought to know is the layer.
+std::string layerOf(const std::string& channel) {
+  const size_t dot = channel.find('.');
+  return dot == channel.npos ? channel : channel.substr(0, dot) + ".*";
+}
+
+std::string listOf(const std::set<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += " " + name;
+  return text;
+}
+
+}  // namespace
+
 std::vector<std::string> describeMerge(std::span<const DeepImage> inputs) {
   std::set<std::string> names;
   for (const DeepImage& image : inputs)
     for (const Channel& channel : image.channels) names.insert(channel.name);
-  std::string filled, left;
+  std::set<std::string> filled, left;
   for (const std::string& name : names) {
     if (everyInputHas(inputs, name) || name == "ZBack") continue;
     const auto has = std::ranges::find_if(inputs, [&](const DeepImage& image) { return image.find(name); });
-    (staysAlone(*has->find(name)) ? filled : left) += " " + name;
+    (staysAlone(*has->find(name)) ? filled : left).insert(layerOf(name));
   }
   std::vector<std::string> lines;
-  if (!filled.empty()) lines.push_back("0 where an image does not have it:" + filled);
-  if (!left.empty()) lines.push_back("left out, since not every image has it:" + left);
+  if (!filled.empty()) lines.push_back("0 where an image does not have it:" + listOf(filled));
+  if (!left.empty()) lines.push_back("left out, since not every image has it:" + listOf(left));
   return lines;
 }
 

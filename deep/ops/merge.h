@@ -19,7 +19,7 @@ namespace fathom::deep {
 // which do not describe the whole. Throws Error, too, where an input has no A or no Z.
 DeepImage merge(std::span<const DeepImage> inputs);
 
-// The channels by input that `merge` fills up with 0, and those that it leaves out; for the user.
+// The channels that `merge` fills up with 0, and those that it leaves out, by layer; a line each for the user.
 std::vector<std::string> describeMerge(std::span<const DeepImage> inputs);
 
 }  // namespace fathom::deep
