@@ -25,8 +25,8 @@ std::optional<std::string> textOf(const Imf::Attribute& attribute) {
   const auto* typed = dynamic_cast<const Attribute*>(&attribute);
   if (!typed) return {};
   static_assert(sizeof(typed->value()) % sizeof(T) == 0);
-  return flat::attributeText(
-      std::span(reinterpret_cast<const T*>(&typed->value()), sizeof(typed->value()) / sizeof(T)));
+  const auto* first = reinterpret_cast<const T*>(&typed->value());
+  return flat::attributeText(std::span(first, reinterpret_cast<const T*>(&typed->value() + 1)));
 }
 
 std::optional<std::string> textOf(const Imf::Attribute& attribute) {
@@ -37,7 +37,7 @@ std::optional<std::string> textOf(const Imf::Attribute& attribute) {
         textOf<Imf::FloatAttribute, float>, textOf<Imf::V2fAttribute, float>, textOf<Imf::V3fAttribute, float>,
         textOf<Imf::M33fAttribute, float>, textOf<Imf::M44fAttribute, float>,
         textOf<Imf::ChromaticitiesAttribute, float>})
-    if (const auto text = convert(attribute)) return text;
+    if (auto text = convert(attribute)) return text;
   return {};
 }
 
@@ -45,7 +45,7 @@ std::optional<std::string> textOf(const Imf::Attribute& attribute) {
 template <class Attribute, class T>
 std::unique_ptr<Imf::Attribute> typed(const std::vector<T>& values) {
   auto attribute = std::make_unique<Attribute>();
-  if (values.size() != sizeof(attribute->value()) / sizeof(T)) return {};
+  if (values.size() * sizeof(T) != sizeof(attribute->value())) return {};
   std::copy(values.begin(), values.end(), reinterpret_cast<T*>(&attribute->value()));
   return attribute;
 }

@@ -101,7 +101,7 @@ class PixelFog {
 DeepImage fogVolumes(const DeepImage& image, const FogParams& params) {
   const Box& window = image.dataWindow;
   DeepImage result{window, image.displayWindow, Buffer<uint64_t>(window.area() + 1, 0), {}, image.attributes};
-  FogSlabs(image, params);  // throws where they do not do
+  const FogSlabs checked(image, params);  // throws where they do not do, with or without rows
   std::vector<std::vector<Slab>> rows(size_t(window.height()));
   const auto first = [&](int row) { return size_t(row) * size_t(window.width()); };
   parallelFor(0, window.height(), [&](int row) {
@@ -131,7 +131,7 @@ DeepImage insertFog(DeepImage image, const FogParams& params) {
 }
 
 DeepImage applyFog(DeepImage image, const FogParams& params) {
-  FogSlabs(image, params);  // throws where they do not do
+  const FogSlabs checked(image, params);  // throws where they do not do, with or without rows
   dropSampleStatistics(image);
   image.attributes.erase("fathom:spp");
   const Box& window = image.dataWindow;

@@ -27,8 +27,6 @@ using reference::randomSamples;
 using reference::samplesOf;
 using reference::together;
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
 DeepImage randomImage(unsigned seed, bool odd = false) {
   return randomSamples({.seed = seed, .volumes = seed % 3 != 0, .most = 8, .odd = odd, .sorted = seed % 4 != 1});
 }
