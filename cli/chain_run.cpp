@@ -20,6 +20,8 @@ constexpr size_t kBandsAtOnce = 3;
 constexpr double kCopies = 5;
 // What the program takes without any image.
 constexpr double kProgramBytes = 24e6;
+// Bands are of whole tiles, and of as many rows of scanlines, where the memory allows that.
+constexpr int kRowsAtLeast = 16;
 // Larger bands gain nothing.
 constexpr double kMostBandBytes = 32e6;
 
@@ -85,12 +87,14 @@ class Run {
   void over(std::span<const Target> targets, const Progress& progress, ChainRunReport& report) {
     const std::vector<Rows> bands = bandsOf(targets);
     if (bands.empty()) return;
-    double read = 0, written = 0, rows = 0;
+    double read = 0, written = 0;
+    uint64_t samples = 0;
     std::atomic<int64_t> worked = 0;  // microseconds
+    std::atomic<size_t> taken = 0;
     const auto fetch = [&](size_t i) {
       const Stopwatch watch;
-      progress.at(rows / double(bands.back().y1 - bands.front().y0));
-      Band band = fetchBand(targets, bands[i], report);
+      progress.at(double(taken) / double(bands.size()));
+      Band band = fetchBand(targets, bands[i], samples);
       read += watch.seconds();
       return band;
     };
@@ -100,14 +104,15 @@ class Run {
       worked += int64_t(1e6 * watch.seconds());
       return made;
     };
-    const auto take = [&](size_t i, std::vector<AnyImage> made) {
+    const auto take = [&](size_t, std::vector<AnyImage> made) {
       const Stopwatch watch;
       for (size_t t = 0; t < targets.size(); ++t) targets[t].take(std::move(made[t]));
-      rows += bands[i].y1 - bands[i].y0;
+      ++taken;
       written += watch.seconds();
     };
     parallelPipeline(0, bands.size(), kBandsAtOnce, fetch, make, take);
     report.counts["bands"] += bands.size();
+    report.counts["samples read"] += samples;
     report.seconds["read"] += read;
     report.seconds["work"] += 1e-6 * double(worked);
     report.seconds["write"] += written;
@@ -150,6 +155,7 @@ class Run {
       if (given.contains("file")) given["file"] = parsePattern(given["file"]).at(frame);
       stage.operation = spec.make(Arguments(spec.name, spec.arguments, std::move(given)), forms);
       stage.window = stage.operation.window ? stage.operation.window(windows) : windows[0];
+      if (Box& box = stage.window; box.empty()) box = {box.x0, box.y0, box.x0, box.y0};
     });
     return stage;
   }
@@ -207,7 +213,8 @@ class Run {
   // Where bands begin and end, over the rows of all targets.
   std::vector<Rows> bandsOf(std::span<const Target> targets) const {
     Rows all{0, 0};
-    int step = 16, origin = 0;
+    int step = kRowsAtLeast, origin = 0;
+    bool tiled = false;
     for (const Target& target : targets) {
       const Box& window = stages_[target.node].window;
       if (window.empty()) continue;
@@ -217,7 +224,8 @@ class Run {
     for (const Stage& stage : stages_)
       if (stage.source && stage.source->part()) {
         origin = stage.window.y0;
-        if (stage.source->part()->tiled) step = stage.source->part()->tileHeight;
+        tiled = stage.source->part()->tiled;
+        step = tiled ? stage.source->part()->tileHeight : kRowsAtLeast;
       }
     const double memory = double(params_.memory);
     const double budget =
@@ -229,7 +237,6 @@ class Run {
         const int at = end - origin;
         end = std::min(all.y1, origin + (at >= 0 ? at / step + 1 : -((-at - 1) / step)) * step);
       } while (end < all.y1 && decodedBytes(targets, {y, end + step}) <= budget);
-      const bool tiled = step != 16;
       while (!tiled && end - y > 1 && decodedBytes(targets, {y, end}) > budget) end = y + (end - y) / 2;
       if (params_.bandRows > 0) end = std::min(all.y1, y + params_.bandRows);
       bands.push_back({y, end});
@@ -238,13 +245,12 @@ class Run {
     return bands;
   }
 
-  Band fetchBand(std::span<const Target> targets, const Rows& rows, ChainRunReport& report) {
+  Band fetchBand(std::span<const Target> targets, const Rows& rows, uint64_t& samples) {
     Band band{rows, wantedBy(targets, rows), std::vector<std::optional<AnyImage>>(stages_.size())};
     for (size_t n = 0; n < stages_.size(); ++n) {
       if (!stages_[n].source || !band.wanted[n]) continue;
       band.images[n] = stages_[n].source->read(band.wanted[n]->y0, band.wanted[n]->y1);
-      if (const auto* deep = std::get_if<deep::DeepImage>(&*band.images[n]))
-        report.counts["samples read"] += deep->samples();
+      if (const auto* deep = std::get_if<deep::DeepImage>(&*band.images[n])) samples += deep->samples();
     }
     return band;
   }

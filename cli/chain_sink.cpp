@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cli/chain_run.h"
+#include "cli/chain_source.h"
 #include "deep/channels.h"
 #include "flat/error.h"
 #include "flat/io.h"
@@ -29,7 +30,12 @@ void toDisplay(flat::Image& image) {
 
 }  // namespace
 
-ChainSink::ChainSink(ChainSinkParams params, const AnyImage& form, const Box& dataWindow) : params_(std::move(params)) {
+ChainSink::ChainSink(ChainSinkParams params, const AnyImage& form, const Box& window) : params_(std::move(params)) {
+  Box dataWindow = window;
+  if (window.empty()) {  // an EXR has a pixel at least
+    dataWindow = {window.x0, window.y0, window.x0 + 1, window.y0 + 1};
+    onlyPixel_ = toWindow(rowsOf(form, dataWindowOf(form).y0, dataWindowOf(form).y0), dataWindow);
+  }
   const bool png = params_.path.ends_with(".png");
   if (const auto* deep = std::get_if<deep::DeepImage>(&form)) {
     if (png) fail("{}: expected a flat image for a PNG, found a deep one; --flatten comes first", params_.path);
@@ -57,6 +63,7 @@ void ChainSink::write(AnyImage rows) {
 }
 
 void ChainSink::finish() {
+  if (onlyPixel_) write(std::move(*onlyPixel_));
   if (writer_) return writer_->finish();
   if (params_.path.ends_with(".png")) {
     toDisplay(flat_);

@@ -19,8 +19,9 @@ struct ChainSinkParams {
 // The file appears with finish(), whole.
 class ChainSink {
  public:
-  // `form`: the image without rows; `dataWindow`: of all of it.
-  ChainSink(ChainSinkParams params, const AnyImage& form, const Box& dataWindow);
+  // `form`: the image without rows; `window`: the data window of all of it. Where that is empty, the file has a pixel
+  // without samples, or of 0, at its corner.
+  ChainSink(ChainSinkParams params, const AnyImage& form, const Box& window);
 
   // The next rows below those already written.
   void write(AnyImage rows);
@@ -30,6 +31,7 @@ class ChainSink {
   ChainSinkParams params_;
   std::optional<deep::Writer> writer_;
   flat::Image flat_;
+  std::optional<AnyImage> onlyPixel_;
 };
 
 }  // namespace fathom::cli

@@ -103,6 +103,14 @@ TEST_F(CompCommand, SaysWhatIsWrong) {
   EXPECT_EQ(comp("hero.exr -o out.png").status, 1);
 }
 
+TEST_F(CompCommand, AnImageWithoutPixelsIsWrittenWithAnEmptyOne) {
+  ASSERT_EQ(comp("hero.exr --crop 900,900,5,5 -o none.exr --flatten -o none.flat.exr").status, 0);
+  const deep::DeepImage image = deep::read(folder_ / "none.exr");
+  EXPECT_EQ(image.pixels(), 1u);
+  EXPECT_EQ(image.samples(), 0u);
+  EXPECT_EQ(flat::read(folder_ / "none.flat.exr").get("A").values[0], 0);
+}
+
 TEST_F(CompCommand, KeepsFramesThatTheSameChainHasMade) {
   for (const int frame : {1, 2, 3})
     std::filesystem::copy(folder_ / "hero.exr", folder_ / ("in.000" + std::to_string(frame) + ".exr"));
