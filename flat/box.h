@@ -24,4 +24,8 @@ inline Box intersect(const Box& a, const Box& b) {
   return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
 }
 
+inline Box moved(const Box& box, int x, int y) {
+  return {box.x0 + x, box.y0 + y, box.x1 + x, box.y1 + y};
+}
+
 }  // namespace fathom
