@@ -349,7 +349,9 @@ ChainRunReport runChain(const Chain& chain, int frame, const ChainRunParams& par
   for (size_t n = 0; n < chain.nodes.size(); ++n)
     if (run.stage(n).operation.summary)
       for (const std::string& line : run.stage(n).operation.summary())
-        report.notes.push_back(fmt::format("{}: {}", chain.nodes[n].operation->name, line));
+        report.notes.push_back(chain.nodes[n].operation->watches  // a report, whose lines stand for themselves
+                                   ? line
+                                   : fmt::format("{}: {}", chain.nodes[n].operation->name, line));
   return report;
 }
 

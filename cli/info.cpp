@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "cli/bands.h"
 #include "cli/commands.h"
+#include "cli/statistics_report.h"
 #include "deep/denoise.h"
 #include "deep/io.h"
 #include "deep/statistics.h"
@@ -58,10 +58,6 @@ std::vector<Part> inspect(const std::string& file) {
     parts.push_back(std::move(part));
   }
   return parts;
-}
-
-const char* typeName(deep::PixelType type) {
-  return type == deep::PixelType::Uint ? "UINT" : type == deep::PixelType::Half ? "HALF" : "FLOAT";
 }
 
 std::string kindOf(const deep::PartInfo& part) {
@@ -117,21 +113,6 @@ json boxJson(const Box& box) {
   return {{"x", box.x0}, {"y", box.y0}, {"width", box.width()}, {"height", box.height()}};
 }
 
-json statisticsJson(const deep::Statistics& s) {
-  json histogram = json::array();
-  for (size_t i = 0; i < s.histogram.size(); ++i)
-    if (s.histogram[i] > 0) histogram.push_back({{"samples", s.bucketName(i)}, {"pixels", s.histogram[i]}});
-  json result = {{"total", s.samples},
-                 {"mean", double(s.samples) / double(s.pixels)},
-                 {"most", s.mostSamples},
-                 {"histogram", histogram},
-                 {"volumes", s.volumes},
-                 {"badDepths", s.badDepths},
-                 {"unsortedPixels", s.unsortedPixels}};
-  if (s.nearest <= s.farthest) result["depth"] = {s.nearest, s.farthest};
-  return result;
-}
-
 json partJson(const Part& part) {
   json channels = json::array();
   for (const auto& c : part.info.channels) channels.push_back({{"name", c.name}, {"type", typeName(c.type)}});
@@ -150,7 +131,7 @@ json partJson(const Part& part) {
 }
 
 void printLine(const char* label, const std::string& text) {
-  fmt::print("    {:<10} {}\n", label, text);
+  fmt::print("{}\n", reportLine(label, text));
 }
 
 void printChannels(const deep::PartInfo& part) {
@@ -162,24 +143,6 @@ void printChannels(const deep::PartInfo& part) {
   }
 }
 
-void printStatistics(const deep::Statistics& s) {
-  printLine("samples", fmt::format("{}: {:.3g} a pixel, {} at most", s.samples, double(s.samples) / double(s.pixels),
-                                   s.mostSamples));
-  const uint64_t highest = *std::max_element(s.histogram.begin(), s.histogram.end());
-  for (size_t i = 0; i < s.histogram.size(); ++i) {
-    if (s.histogram[i] == 0) continue;
-    constexpr double kBar = 40;
-    const auto bar = size_t(std::ceil(kBar * double(s.histogram[i]) / double(highest)));
-    fmt::print("    {:>10} {:5.1f} %  {}\n", s.bucketName(i), 100 * double(s.histogram[i]) / double(s.pixels),
-               std::string(bar, '#'));
-  }
-  if (s.nearest <= s.farthest) printLine("depth", fmt::format("{:g} to {:g}", s.nearest, s.farthest));
-  if (s.volumes > 0) printLine("volumes", fmt::format("{} samples have an extent (ZBack behind Z)", s.volumes));
-  if (s.unsortedPixels > 0)
-    printLine("unsorted", fmt::format("{} pixels are not front to back: see fathom tidy", s.unsortedPixels));
-  if (s.badDepths > 0) printLine("damaged", fmt::format("{} samples have a depth that is not finite", s.badDepths));
-}
-
 void print(const Part& part, bool withAttributes) {
   const deep::PartInfo& info = part.info;
   fmt::print("  part {}{}: {}, {}\n", info.number, info.name.empty() ? "" : " " + printable(info.name), kindOf(info),
@@ -187,7 +150,8 @@ void print(const Part& part, bool withAttributes) {
   printLine("data", windowText(info.dataWindow));
   if (info.displayWindow != info.dataWindow) printLine("display", windowText(info.displayWindow));
   printChannels(info);
-  if (part.statistics) printStatistics(*part.statistics);
+  if (part.statistics)
+    for (const std::string& line : statisticsLines(*part.statistics)) fmt::print("{}\n", line);
   const std::vector<std::string> used = usedInputs(part.inputs);
   printLine("denoise", "uses " + (used.empty() ? std::string("colour and depth alone")
                                                : fmt::format("{}", fmt::join(used, ", "))));

@@ -110,7 +110,7 @@ const std::vector<std::string> kDepths = {"mean", "front", "back", "transmittanc
 
 deep::FlatDepth flatDepth(const std::string& name) {
   const auto found = std::ranges::find(kDepths, name);
-  if (found == kDepths.end()) fail("flatten: depths: expected {}, found {}", fmt::join(kDepths, ", "), name);
+  if (found == kDepths.end()) fail("depths: expected {}, found {}", fmt::join(kDepths, ", "), name);
   return deep::FlatDepth(found - kDepths.begin());
 }
 

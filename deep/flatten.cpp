@@ -131,7 +131,7 @@ void write(const Row& row, const Outputs& outputs) {
 
 flat::Image flatten(const DeepImage& image, const FlattenParams& params) {
   if (!(params.transmittance >= 0 && params.transmittance < 1))
-    fail("flatten: transmittance: expected at least 0 and below 1, found {}", params.transmittance);
+    fail("transmittance: expected at least 0 and below 1, found {}", params.transmittance);
   const bool ends = params.z != FlatDepth::Mean || !params.depths.empty();
   (void)RowCompositor(image);  // throws for images without rows, too
   flat::Image result{image.dataWindow, image.displayWindow, {}, flatAttributes(image.attributes)};

@@ -29,7 +29,11 @@ void Statistics::add(const DeepImage& band) {
   samples += band.samples();
   for (size_t pixel = 0; pixel < band.pixels(); ++pixel) {
     const uint64_t count = band.count(pixel);
-    mostSamples = std::max(mostSamples, count);
+    if (count > mostSamples) {
+      mostSamples = count;
+      mostX = band.dataWindow.x0 + int(pixel % size_t(band.dataWindow.width()));
+      mostY = band.dataWindow.y0 + int(pixel / size_t(band.dataWindow.width()));
+    }
     ++histogram[bucketOf(count)];
     bool sorted = true;
     if (!z.empty())

@@ -13,6 +13,7 @@ namespace fathom::deep {
 struct Statistics {
   uint64_t pixels = 0, samples = 0;
   uint64_t mostSamples = 0;  // in a pixel
+  int mostX = 0, mostY = 0;  // the first such pixel
   // Pixels by their number of samples: 0, 1, 2, 3-4, 5-8, 9-16 and so on; kBuckets - 1 takes the rest.
   static constexpr size_t kBuckets = 18;
   std::array<uint64_t, kBuckets> histogram = {};

@@ -143,7 +143,7 @@ flat::Image idMatte(const DeepImage& image, const std::string& channel, std::spa
 }
 
 RankedIds rankIds(const DeepImage& image, const std::string& channel, int ranks) {
-  if (ranks < 1 || ranks > 200) fail("ids: ranks: expected 1 to 200, found {}", ranks);
+  if (ranks < 1 || ranks > 200) fail("ranks: expected 1 to 200, found {}", ranks);
   const std::span<const uint32_t> ids = idsOf(image, channel);
   RankedIds result{emptyResult(image)};
   for (int layer = 0; layer < (ranks + 1) / 2; ++layer)
