@@ -33,12 +33,11 @@ std::array<ViewRays, 3> raysOf(const DeepImage& image, const PointsParams& param
     fail("fov: expected degrees between 0 and 180, found {}", *params.fieldOfView);
   if (params.world && !hasWorldSpace(image))
     fail("expected the attribute worldToCamera, with an inverse, for world space; found none");
+  if (!ViewRays(image.attributes, image.displayWindow, params.fieldOfView, Axis::X).hasScale())
+    fail("expected fov, or one of the attributes worldToNDC, fieldOfView, fathom:ppuScale, found none");
   const Attributes attributes = params.world ? image.attributes : atOrigin(image, params.fieldOfView);
   const auto along = [&](Axis axis) { return ViewRays(attributes, image.displayWindow, params.fieldOfView, axis); };
-  std::array<ViewRays, 3> rays = {along(Axis::X), along(Axis::Y), along(Axis::Z)};
-  if (!rays[0].hasScale())
-    fail("expected fov, or one of the attributes worldToNDC, fieldOfView, fathom:ppuScale, found none");
-  return rays;
+  return {along(Axis::X), along(Axis::Y), along(Axis::Z)};
 }
 
 // Without a pattern that would line up with the pixels.
