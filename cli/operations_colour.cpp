@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <memory>
 
 #include "cli/operation.h"
+#include "cli/row_counts.h"
 #include "deep/ops/compress.h"
 #include "deep/ops/expression.h"
 #include "deep/ops/grade.h"
@@ -80,17 +80,18 @@ Operation makeRecolour(const Arguments& arguments, std::span<const InputForm> in
   const deep::RecolourParams params{.channels = arguments.words("channels"), .matte = arguments.flag("matte")};
   const deep::DeepImage& form = deepOf(inputs[0].image);
   const auto lines = describeDropped(form, deep::recolour(form.copy(), flatOf(inputs[1].image), params));
-  const auto uncovered = std::make_shared<std::atomic<uint64_t>>(0);
+  const auto uncovered = std::make_shared<RowCounts>();
   Operation operation;
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
-    *uncovered += deep::countUncovered(deepOf(in[0]), flatOf(in[1]), params);
+    const auto found = deep::countUncovered(deepOf(in[0]), flatOf(in[1]), params);
+    uncovered->set<size_t>(deepOf(in[0]).dataWindow.y0, found);
     return deep::recolour(std::move(deepOf(in[0])), flatOf(in[1]), params);
   };
   operation.summary = [=] {
     std::vector<std::string> all = lines;
-    if (*uncovered > 0)
+    if (uncovered->total() > 0)
       all.push_back(
-          fmt::format("{} pixels of the flat image have no deep sample: their colour is lost", uncovered->load()));
+          fmt::format("{} pixels of the flat image have no deep sample: their colour is lost", uncovered->total()));
     return all;
   };
   return operation;
@@ -113,22 +114,22 @@ Operation makeExpression(const Arguments& arguments, std::span<const InputForm> 
 
 Operation makeCompress(const Arguments& arguments, std::span<const InputForm> inputs) {
   struct Count {
-    std::atomic<uint64_t> before = 0, after = 0;
+    RowCounts before, after;
   };
   const deep::CompressParams params{.error = arguments.number("error")};
   const auto count = std::make_shared<Count>();
   const deep::DeepImage& form = deepOf(inputs[0].image);
   Operation operation;
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
-    count->before += deepOf(in[0]).samples();
+    count->before.setSamples(deepOf(in[0]));
     deep::DeepImage result = deep::compress(std::move(deepOf(in[0])), params);
-    count->after += result.samples();
+    count->after.setSamples(result);
     return result;
   };
   operation.summary = [=, lines = describeDropped(form, deep::compress(form.copy(), params))] {
-    const double share = 100 * double(count->after) / double(std::max<uint64_t>(count->before, 1));
-    std::vector<std::string> all{
-        fmt::format("{} samples of {} ({:.1f} %)", count->after.load(), count->before.load(), share)};
+    const uint64_t before = count->before.total(), after = count->after.total();
+    const double share = before > 0 ? 100 * double(after) / double(before) : 100;
+    std::vector<std::string> all{fmt::format("{} samples of {} ({:.1f} %)", after, before, share)};
     std::ranges::copy(lines, std::back_inserter(all));
     return all;
   };

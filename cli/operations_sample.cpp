@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "cli/operation.h"
+#include "cli/row_counts.h"
 #include "deep/channels.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
@@ -75,7 +76,7 @@ Operation makeCrop(const Arguments& arguments, std::span<const InputForm>) {
 // What tidying found in the whole image and did to it.
 struct TidyCount {
   deep::Untidiness untidiness;
-  std::atomic<uint64_t> before = 0, after = 0;
+  RowCounts before, after;
 };
 
 Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
@@ -87,15 +88,15 @@ Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
   const auto merges = [count] { return count->untidiness.pointsCoincide || count->untidiness.volumesOverlap; };
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
     deep::DeepImage& image = deepOf(in[0]);
-    count->before += image.samples();
+    count->before.setSamples(image);
     if (merges()) deep::dropSampleStatistics(image);
     if (count->untidiness.any()) image.attributes.erase("deepImageState");
     deep::DeepImage result = deep::tidy(std::move(image)).image;
-    count->after += result.samples();
+    count->after.setSamples(result);
     return result;
   };
   operation.summary = [=] {
-    std::vector<std::string> lines{fmt::format("{} samples, {} before{}", count->after.load(), count->before.load(),
+    std::vector<std::string> lines{fmt::format("{} samples, {} before{}", count->after.total(), count->before.total(),
                                                count->untidiness.any() ? "" : ", was tidy")};
     if (merges() && !statistics.empty()) lines.push_back("samples were merged or split, so these were dropped:");
     for (const std::string& name : statistics)

@@ -13,10 +13,11 @@ struct ExpressionParams {
 };
 
 // The image with channels set from formulas, one after the other, so that a later one sees what an earlier one gave. A
-// channel that is not there is added as FLOAT. Formulas are muParser's, in double precision: its operators (+ - * / ^ < <=
-// > >= == != && || ?:) and functions, and besides those clamp(v, low, high), lerp(a, b, t), smoothstep(low, high, v),
-// floor, ceil and mod(a, b). Names are channels (letters, digits, _ and dots), and x and y of the pixel, i, the sample's
-// place in its pixel from 0, and n, how many samples the pixel has; these four hide channels of such names.
+// channel that is not there is added as FLOAT. Formulas are muParser's, in double precision: its operators (+ - * / ^
+// < <= > >= == != && || ?:) and functions, and besides those clamp(v, low, high), lerp(a, b, t), smoothstep(low, high,
+// v), floor, ceil and mod(a, b). Names are channels (letters, digits, _ and dots), and x and y of the pixel, i, the
+// place of the sample in its pixel from 0, and n, how many samples the pixel has; these four hide channels of such
+// names.
 //
 // Values are read as they are, NaN and infinities included; what results as NaN or beyond 1e15 is set to 0, but Z and
 // ZBack are set to it. UINT channels are read exactly, and set to the nearest whole number within [0, 2^32). With
@@ -25,7 +26,8 @@ struct ExpressionParams {
 //
 // Left out, unless they are set themselves: variances and half buffers of what is set; where A is set, all of them,
 // sample counts and the attribute fathom:spp, which say what alphas stand for; where Z or ZBack is set, the attribute
-// deepImageState. Throws Error, with the formula, the place in it and what is wrong, for what cannot be understood.
+// deepImageState. Throws Error, with the formula, the place in it and what is wrong, for what cannot be understood, and
+// for `unpremultiplied` without A.
 DeepImage expression(DeepImage image, const ExpressionParams& params);
 
 }  // namespace fathom::deep

@@ -133,16 +133,17 @@ DeepImage recolour(DeepImage deep, const flat::Image& flat, const RecolourParams
   return deep;
 }
 
-size_t countUncovered(const DeepImage& deep, const flat::Image& flat, const RecolourParams& params) {
+std::vector<size_t> countUncovered(const DeepImage& deep, const flat::Image& flat, const RecolourParams& params) {
   std::vector<const flat::Plane*> planes{};
   for (const std::string& name : planesNamed(flat, params)) planes.push_back(&flat.get(name));
   if (const flat::Plane* alpha = flat.find("A")) planes.push_back(alpha);
   const Box common = intersect(deep.dataWindow, flat.dataWindow);
-  size_t found = 0;
+  std::vector<size_t> found(size_t(deep.dataWindow.height()), 0);
   for (int y = common.y0; y < common.y1; ++y)
     for (int x = common.x0; x < common.x1; ++x)
       if (deep.count(deep.dataWindow.index(x, y)) == 0)
-        found += std::ranges::any_of(planes, [&](const flat::Plane* p) { return valueAt(flat, *p, x, y) != 0; });
+        found[size_t(y - deep.dataWindow.y0)] +=
+            std::ranges::any_of(planes, [&](const flat::Plane* p) { return valueAt(flat, *p, x, y) != 0; });
   return found;
 }
 
