@@ -31,9 +31,18 @@ DeepImage randomImage(unsigned seed, bool odd = false) {
   return randomSamples({.seed = seed, .volumes = seed % 3 != 0, .most = 8, .odd = odd, .sorted = seed % 4 != 1});
 }
 
+// Every alpha that a float can hold on the way from 1e-30 over 1 - 2^-24 to 1.
+DeepImage nearlyOpaque(unsigned seed) {
+  DeepImage image = randomImage(seed);
+  std::mt19937 random(seed);
+  for (float& alpha : image.get("A"))
+    if (random() % 4 == 0) alpha = 1 - std::pow(2.0f, -float(random() % 25));
+  return image;
+}
+
 TEST(Holdout, IsWhatTheEquationOfTransferShowsOfTheImage) {
-  for (unsigned seed = 1; seed <= 40; ++seed) {
-    const DeepImage image = randomImage(seed), other = randomImage(seed + 1000);
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const DeepImage image = nearlyOpaque(seed), other = nearlyOpaque(seed + 1000);
     const flat::Image flat = flatten(holdout(image.copy(), other));
     for (size_t p = 0; p < image.pixels(); ++p) {
       const Radiance seen = integrate(together(mediaOf(image, p), mediaOf(other, p, "R", 1)), 2);
