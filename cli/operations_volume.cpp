@@ -1,9 +1,10 @@
-// Operations on what stands in front of what, and on volumes: holdout, clip by a map, plus, deepen, fog.
+// Operations on what stands in front of what, and on volumes: holdout, clip by a map, keymix, plus, deepen, fog.
 #include "cli/operation.h"
 #include "deep/clip.h"
 #include "deep/ops/deepen.h"
 #include "deep/ops/fog.h"
 #include "deep/ops/holdout.h"
+#include "deep/ops/keymix.h"
 #include "deep/ops/plus.h"
 #include "flat/error.h"
 
@@ -58,6 +59,20 @@ Operation makeDeepen(const Arguments& arguments, std::span<const InputForm> inpu
   if (arguments.has("z")) params.z = float(arguments.number("z"));
   deep::deepen(flatOf(inputs[0].image), params);  // throws where they do not do
   return {.apply = [=](std::vector<AnyImage> in) -> AnyImage { return deep::deepen(flatOf(in[0]), params); }};
+}
+
+Operation makeKeymix(const Arguments& arguments, std::span<const InputForm> inputs) {
+  const flat::Image& matte = flatOf(inputs[2].image);
+  if (matte.planes.empty()) fail("keymix: expected a matte with a channel, found none");
+  const std::string channel =
+      arguments.has("channel") ? arguments.text("channel") : (matte.find("A") ? "A" : matte.planes[0].name);
+  matte.get(channel);
+  Operation operation;
+  operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
+    return deep::keymix(deepOf(in[0]), deepOf(in[1]), flatOf(in[2]), channel);
+  };
+  operation.window = [](std::span<const Box> windows) { return unionOf(windows[0], windows[1]); };
+  return operation;
 }
 
 deep::FogParams fogParams(const Arguments& arguments) {
@@ -124,6 +139,12 @@ void addVolumeOperations(std::vector<OperationSpec>& table) {
        {{"keep", Type::Text, "front", "front or behind", false, {"front", "behind"}},
         {"channel", Type::Text, "Z", "the channel of the flat image with the depths"}},
        makeClipMap});
+  table.push_back({"keymix",
+                   "The first image where a flat matte is 1, the second where it is 0, and their mean between.",
+                   {Deep, Deep, Flat},
+                   false,
+                   {{"channel", Type::Text, "", "the channel of the matte; A or the first, where it is not given"}},
+                   makeKeymix});
   table.push_back({"plus",
                    "Add the light of the second image to the first: it hides nothing, and what is in front of it hides "
                    "it.",

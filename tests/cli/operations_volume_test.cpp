@@ -52,6 +52,8 @@ TEST_F(VolumeOperations, GiveTheSameBitsForAnyBands) {
                                      {"hero.exr", "smoke.exr", "--plus"},
                                      {"hero.exr", "flat.exr", "--clipmap"},
                                      {"hero.exr", "flat.exr", "--clipmap", "keep=behind", "channel=G"},
+                                     {"hero.exr", "smoke.exr", "flat.exr", "--keymix"},
+                                     {"hero.exr", "smoke.exr", "flat.exr", "--keymix", "channel=G"},
                                      {"hero.exr", "--clip", "2", "3"},
                                      {"hero.exr", "--clip", "0", "inf"},
                                      {"flat.exr", "--deepen"},
