@@ -53,10 +53,10 @@ Operation makeIds(const Arguments& arguments, std::span<const InputForm>) {
     while (ranked.most > before && !most->compare_exchange_weak(before, ranked.most)) continue;
     return std::move(ranked.image);
   };
-  operation.summary = [=]() -> std::vector<std::string> {
-    if (*most <= size_t(ranks + ranks % 2)) return {};
+  operation.summary = [=, kept = size_t(ranks) + size_t(ranks % 2)]() -> std::vector<std::string> {
+    if (*most <= kept) return {};
     return {fmt::format("up to {} ids in a pixel: those of least coverage beyond {} ranks are left out", most->load(),
-                        ranks + ranks % 2)};
+                        kept)};
   };
   return operation;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #include "deep/ppu_scale.h"
@@ -60,7 +61,7 @@ struct Source {
 };
 
 uint8_t toByte(double value) {
-  return uint8_t(std::min(std::max(value, 0.0), 1.0) * 255 + 0.5);
+  return uint8_t(std::lround(std::min(std::max(value, 0.0), 1.0) * 255));
 }
 
 struct Point {
