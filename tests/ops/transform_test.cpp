@@ -93,6 +93,14 @@ TEST(Transform, PartPixelsFadeAtTheEdge) {
   EXPECT_NEAR(b[3], 0.25f * a[2], 1e-6);
 }
 
+TEST(Transform, TheSmallestPartOfAPixelCounts) {
+  DeepImage image = randomSamples({.window = {0, 0, 3, 2}, .seed = 1});
+  const flat::Image before = flatten(image);
+  const flat::Image after = flatten(transform(std::move(image), {.x = 1e-4}));
+  EXPECT_EQ(after.dataWindow, (Box{0, 0, 4, 2}));
+  EXPECT_NEAR(after.get("A").values[3], 1e-4f * before.get("A").values[2], 1e-10);
+}
+
 TEST(Transform, RefusesWhatIsNoTransform) {
   const DeepImage image = randomSamples({.seed = 1});
   for (const Transform& how : {Transform{.x = kInfinity}, Transform{.z = kNan}, Transform{.scale = 0},
