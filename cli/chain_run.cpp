@@ -22,8 +22,8 @@ constexpr double kCopies = 5;
 constexpr double kProgramBytes = 24e6;
 // Bands are of whole tiles, and of as many rows of scanlines, where the memory allows that.
 constexpr int kRowsAtLeast = 16;
-// Larger bands gain nothing.
-constexpr double kMostBandBytes = 32e6;
+// Larger bands only leave the caches.
+constexpr double kMostBandBytes = 12e6;
 
 class Stopwatch {
  public:
@@ -69,6 +69,23 @@ auto named(const std::string& about, const Body& body) {
   } catch (const Error& e) {
     fail("{}: {}", about, e.what());
   }
+}
+
+// The channels of a node that anything reads; empty: all.
+deep::ChannelFilter channelsRead(const Chain& chain, size_t node) {
+  std::vector<std::function<bool(const std::string&)>> readers;
+  for (const ChainOutput& output : chain.outputs)
+    if (output.node == node) return {};
+  for (const ChainNode& user : chain.nodes)
+    for (size_t i = 0; i < user.inputs.size(); ++i) {
+      if (user.inputs[i] != node) continue;
+      if (!user.operation->reads) return {};
+      readers.push_back([&reads = user.operation->reads, i](const std::string& channel) { return reads(i, channel); });
+    }
+  if (readers.empty()) return {};
+  return [readers](const std::string& channel) {
+    return std::ranges::any_of(readers, [&](const auto& reader) { return reader(channel); });
+  };
 }
 
 class Run {
@@ -128,7 +145,8 @@ class Run {
 
   Stage makeStage(const ChainNode& node, int frame) {
     if (!node.operation) {
-      auto source = std::make_unique<ChainSource>(node.file.at(frame), node.part, params_.memory);
+      auto source = std::make_unique<ChainSource>(node.file.at(frame), node.part, params_.memory,
+                                                  channelsRead(chain_, size_t(&node - chain_.nodes.data())));
       Stage stage{std::move(source), {}, {}, {}, node.file.at(frame)};
       stage.form = stage.source->form();
       stage.window = stage.source->dataWindow();

@@ -14,7 +14,7 @@
 namespace fathom::cli {
 
 struct ChainRunParams {
-  size_t memory = size_t(8) << 30;  // bytes that all of it may take, flat results and flat inputs aside
+  size_t memory = size_t(8) << 30;  // bytes that all of it may take, flat inputs and PNGs aside
   int bandRows = 0;                 // rows of a band; 0: what the memory allows
   // Written into every EXR as the attribute kChainMadeBy; empty: none.
   std::string madeBy = {};

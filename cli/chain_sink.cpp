@@ -42,34 +42,35 @@ ChainSink::ChainSink(ChainSinkParams params, const AnyImage& form, const Box& wi
     deep::DeepImage layout = deep->copy();
     if (params_.half) storeAsHalf(layout);
     if (!params_.madeBy.empty()) layout.attributes.set(kChainMadeBy, params_.madeBy);
-    writer_.emplace(params_.path, layout, dataWindow, params_.options);
+    deep_.emplace(params_.path, layout, dataWindow, params_.options);
     return;
   }
   const auto& flat = std::get<flat::Image>(form);
-  flat_ = {dataWindow, flat.displayWindow, {}, flat.attributes};
-  if (!params_.madeBy.empty()) flat_.attributes[kChainMadeBy] = params_.madeBy;
-  for (const flat::Plane& plane : flat.planes) flat_.planes.push_back({plane.name, Buffer<float>(dataWindow.area())});
+  picture_ = {dataWindow, flat.displayWindow, {}, flat.attributes};
+  if (!params_.madeBy.empty()) picture_.attributes[kChainMadeBy] = params_.madeBy;
+  for (const flat::Plane& plane : flat.planes)
+    picture_.planes.push_back({plane.name, Buffer<float>(png ? dataWindow.area() : 0)});
+  if (!png) flat_.emplace(params_.path, picture_, dataWindow, flat::WriteOptions{params_.half});
 }
 
 void ChainSink::write(AnyImage rows) {
-  if (writer_) {
+  if (deep_) {
     if (params_.half) storeAsHalf(deepOf(rows));
-    return writer_->write(deepOf(rows));
+    return deep_->write(deepOf(rows));
   }
   const flat::Image& image = flatOf(rows);
-  const size_t first = flat_.dataWindow.index(image.dataWindow.x0, image.dataWindow.y0);
-  for (size_t c = 0; c < flat_.planes.size(); ++c)
-    std::ranges::copy(image.planes[c].values, flat_.planes[c].values.begin() + first);
+  if (flat_) return flat_->write(image);
+  const size_t first = picture_.dataWindow.index(image.dataWindow.x0, image.dataWindow.y0);
+  for (size_t c = 0; c < picture_.planes.size(); ++c)
+    std::ranges::copy(image.planes[c].values, picture_.planes[c].values.begin() + first);
 }
 
 void ChainSink::finish() {
   if (onlyPixel_) write(std::move(*onlyPixel_));
-  if (writer_) return writer_->finish();
-  if (params_.path.ends_with(".png")) {
-    toDisplay(flat_);
-    return flat::writePng(params_.path, flat_);
-  }
-  flat::write(params_.path, flat_, {.half = params_.half});
+  if (deep_) return deep_->finish();
+  if (flat_) return flat_->finish();
+  toDisplay(picture_);
+  flat::writePng(params_.path, picture_);
 }
 
 }  // namespace fathom::cli

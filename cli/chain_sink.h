@@ -6,6 +6,7 @@
 
 #include "cli/operation.h"
 #include "deep/io.h"
+#include "flat/exr_writer.h"
 
 namespace fathom::cli {
 
@@ -29,8 +30,9 @@ class ChainSink {
 
  private:
   ChainSinkParams params_;
-  std::optional<deep::Writer> writer_;
-  flat::Image flat_;
+  std::optional<deep::Writer> deep_;
+  std::optional<flat::ExrWriter> flat_;
+  flat::Image picture_;  // of a PNG, gathered here
   std::optional<AnyImage> onlyPixel_;
 };
 

@@ -35,9 +35,11 @@ flat::Image toWindow(const flat::Image& image, const Box& window) {
 
 }  // namespace
 
-ChainSource::ChainSource(const std::string& path, const std::string& part, size_t memoryLimit) : path_(path) {
+ChainSource::ChainSource(const std::string& path, const std::string& part, size_t memoryLimit,
+                         const deep::ChannelFilter& channels)
+    : path_(path) {
   if (isDeep(path, part)) {
-    reader_ = std::make_unique<deep::Reader>(path, deep::ReadOptions{part, {}, memoryLimit});
+    reader_ = std::make_unique<deep::Reader>(path, deep::ReadOptions{part, channels, memoryLimit});
     window_ = reader_->part().dataWindow;
     countSamples();
   } else {

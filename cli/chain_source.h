@@ -13,7 +13,9 @@ namespace fathom::cli {
 class ChainSource {
  public:
   // `part`: number or name; empty: the first deep part, or else the first. A flat image is read whole here.
-  ChainSource(const std::string& path, const std::string& part, size_t memoryLimit);
+  // `channels`: of a deep one, those that are read; empty: all.
+  ChainSource(const std::string& path, const std::string& part, size_t memoryLimit,
+              const deep::ChannelFilter& channels = {});
 
   const std::string& path() const { return path_; }
   const Box& dataWindow() const { return window_; }

@@ -87,6 +87,8 @@ struct OperationSpec {
   // Throws Error where the arguments or the inputs do not do.
   std::function<Operation(const Arguments& arguments, std::span<const InputForm> inputs)> make;
   bool watches = false;  // makes something beside an image: a chain with it needs no -o
+  // Which channels of an input it looks at; empty: all of all inputs.
+  std::function<bool(size_t input, const std::string& channel)> reads = {};
 };
 
 // All operations, in the order in which help lists them. Each family has a file of its own.

@@ -108,6 +108,11 @@ Operation makeFog(const Arguments& arguments, std::span<const InputForm> inputs)
   return operation;
 }
 
+// What hides something.
+bool isOpacity(const std::string& channel) {
+  return channel == "A" || channel == "Z" || channel == "ZBack";
+}
+
 }  // namespace
 
 void addVolumeOperations(std::vector<OperationSpec>& table) {
@@ -123,13 +128,17 @@ void addVolumeOperations(std::vector<OperationSpec>& table) {
         {"opaque", Type::Number, "0.5",
          "with hard: the alpha in front at which a sample goes; 1: only "
          "behind what is opaque"}},
-       makeHoldout});
+       makeHoldout,
+       false,
+       [](size_t input, const std::string& channel) { return input == 0 || isOpacity(channel); }});
   table.push_back({"holdoutmatte",
                    "A flat matte: how much of the first image's alpha is seen past the second, 1 where there is none.",
                    {Deep, Deep},
                    false,
                    {},
-                   makeHoldoutMatte});
+                   makeHoldoutMatte,
+                   false,
+                   [](size_t, const std::string& channel) { return isOpacity(channel); }});
   table.push_back(
       {"clipmap",
        "What lies in front of, or behind, the depths of a flat image; a volume there is cut. Pixels that it "

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "deep/chunk_grid.h"
-#include "deep/exr_codec.h"
 #include "deep/exr_file.h"
+#include "flat/exr_codec.h"
 
 namespace fathom::deep {
 

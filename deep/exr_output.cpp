@@ -1,7 +1,5 @@
 #include "deep/exr_output.h"
 
-#include <OpenEXR/ImfChannelList.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfVersion.h>
@@ -15,28 +13,6 @@
 namespace fathom::deep {
 
 namespace {
-
-// What OpenEXR writes a header to.
-class HeaderBytes : public Imf::OStream {
- public:
-  explicit HeaderBytes(Bytes& bytes) : OStream("header"), bytes_(bytes) {}
-  void write(const char c[], int n) override { std::memcpy(grow(bytes_, size_t(n)), c, size_t(n)); }
-  uint64_t tellp() override { return bytes_.size(); }
-  void seekp(uint64_t) override { throw std::logic_error("a header is written in order"); }
-
- private:
-  Bytes& bytes_;
-};
-
-bool hasLongNames(const Imf::Header& header) {
-  constexpr size_t kShort = 31;
-  const auto isLong = [](const char* name) { return std::strlen(name) > kShort; };
-  for (auto a = header.begin(); a != header.end(); ++a)
-    if (isLong(a.name()) || isLong(a.attribute().typeName())) return true;
-  for (auto c = header.channels().begin(); c != header.channels().end(); ++c)
-    if (isLong(c.name())) return true;
-  return false;
-}
 
 // The bytes of a chunk in a file of many parts, from its part number on.
 uint64_t chunkBytes(const ExrFile& file, const PartInfo& part, uint64_t at) {
@@ -106,8 +82,7 @@ Bytes ExrOutput::head() const {
   int version = Imf::EXR_VERSION | Imf::NON_IMAGE_FLAG | (parts_.size() > 1 ? Imf::MULTI_PART_FILE_FLAG : 0);
   for (const Part& part : parts_) version |= hasLongNames(part.header) ? Imf::LONG_NAMES_FLAG : 0;
   put(bytes, version);
-  HeaderBytes stream(bytes);
-  for (const Part& part : parts_) part.header.writeTo(stream, Imf::isTiled(part.header.type()));
+  for (const Part& part : parts_) putHeader(bytes, part.header, Imf::isTiled(part.header.type()));
   if (parts_.size() > 1) bytes.push_back(0);
   for (const Part& part : parts_)
     for (uint64_t at : part.table) put(bytes, at);

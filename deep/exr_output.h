@@ -4,26 +4,13 @@
 
 #include <OpenEXR/ImfHeader.h>
 
-#include <cstring>
 #include <vector>
 
 #include "deep/exr_file.h"
+#include "flat/exr_bytes.h"
 #include "flat/output_file.h"
 
 namespace fathom::deep {
-
-using Bytes = std::vector<uint8_t>;
-
-// Room for `size` more bytes at the end.
-inline uint8_t* grow(Bytes& bytes, size_t size) {
-  bytes.resize(bytes.size() + size);
-  return bytes.data() + bytes.size() - size;
-}
-
-template <class T>
-void put(Bytes& to, const T& value) {
-  std::memcpy(grow(to, sizeof(T)), &value, sizeof(T));
-}
 
 class ExrOutput {
  public:

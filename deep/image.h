@@ -14,10 +14,11 @@
 #include "deep/attributes.h"
 #include "flat/box.h"
 #include "flat/buffer.h"
+#include "flat/exr_types.h"
 
 namespace fathom::deep {
 
-enum class PixelType { Half, Float, Uint };
+using fathom::PixelType;
 
 // One plane over all samples. HALF is held as float (exactly) and written as HALF again; UINT stays UINT.
 struct Channel {

@@ -14,7 +14,7 @@
 
 namespace fathom::deep {
 
-enum class Compression { None, Rle, Zips, Zip, Other };  // deep parts know the first three
+using fathom::Compression;
 
 struct ChannelInfo {
   std::string name;

@@ -10,9 +10,9 @@
 #include <cstring>
 
 #include "deep/chunk_grid.h"
-#include "deep/exr_codec.h"
 #include "deep/exr_output.h"
 #include "flat/error.h"
+#include "flat/exr_codec.h"
 #include "flat/parallel_in_order.h"
 
 namespace fathom::deep {
@@ -77,13 +77,6 @@ Imf::Header checkedHeader(const std::string& path, const DeepImage& layout, cons
   if (dataWindow.empty()) fail("{}: expected pixels, found an empty data window", path);
   if (layout.channels.empty()) fail("{}: expected channels, found none", path);
   return makeHeader(path, layout, dataWindow, options);
-}
-
-void putHalf(std::span<const float> values, uint8_t* to) {
-  for (size_t i = 0; i < values.size(); ++i) {
-    const uint16_t bits = imath_float_to_half(values[i]);
-    std::memcpy(to + 2 * i, &bits, sizeof(bits));
-  }
 }
 
 }  // namespace

@@ -10,6 +10,8 @@ namespace fathom::deep {
 
 namespace {
 
+constexpr size_t kMostShares = 100'000'000;  // of a pixel: more than is worth the time and the memory
+
 // Of samples in order.
 Untidiness overlapsOf(std::span<const Range> ranges, std::span<const size_t> order) {
   Untidiness result;
@@ -109,35 +111,16 @@ Piece PixelPieces::meet(std::span<const size_t> samples, Range range, std::span<
   return {range, merged.alpha, samples[merged.largest], whole, shares_};
 }
 
-void PixelPieces::visit(std::span<const float> alpha, bool mergePoints,
-                        const std::function<void(const Piece&)>& visit) {
-  if (!untidiness_.any()) {
-    for (const size_t& sample : order_) visit(meet({&sample, 1}, ranges_[sample], alpha));
-    return;
-  }
-  findCuts();
-  active_.clear();
-  size_t next = 0;
-  const auto startsAt = [&](float z) { return next < order_.size() && ranges_[order_[next]].z == z; };
-  for (size_t k = 0; k < cuts_.size(); ++k) {
-    const float z = cuts_[k];
-    std::erase_if(active_, [&](size_t sample) { return ranges_[sample].zBack <= z; });
-    const size_t first = next;
-    while (startsAt(z) && ranges_[order_[next]].isPoint()) ++next;
-    const std::span<const size_t> points = order().subspan(first, next - first);
-    if (mergePoints && !points.empty()) visit(meet(points, {z, z}, alpha));
-    for (size_t i = 0; !mergePoints && i < points.size(); ++i) visit(meet(points.subspan(i, 1), {z, z}, alpha));
-    while (startsAt(z)) active_.push_back(order_[next++]);
-    if (!active_.empty()) visit(meet(active_, {z, cuts_[k + 1]}, alpha));
-  }
+void checkOverlaps(PixelPieces::Size size, const Box& dataWindow, size_t pixel) {
+  const size_t width = size_t(dataWindow.width());
+  if (size.shares > kMostShares)
+    fail("pixel ({}, {}): expected overlapping volumes that make at most {} pieces, found {}",
+         dataWindow.x0 + int(pixel % width), dataWindow.y0 + int(pixel / width), kMostShares, size.shares);
 }
 
-void checkOverlaps(PixelPieces::Size size, const Box& dataWindow, size_t pixel) {
-  constexpr size_t kMost = 100'000'000;
-  const size_t width = size_t(dataWindow.width());
-  if (size.shares > kMost)
-    fail("pixel ({}, {}): expected overlapping volumes that make at most {} pieces, found {}",
-         dataWindow.x0 + int(pixel % width), dataWindow.y0 + int(pixel / width), kMost, size.shares);
+void PixelPieces::checkOverlaps(bool mergePoints, const Box& dataWindow, size_t pixel) {
+  const size_t samples = order_.size();  // each has a share in less than two pieces a sample
+  if (2 * samples * samples > kMostShares) deep::checkOverlaps(size(mergePoints), dataWindow, pixel);
 }
 
 }  // namespace fathom::deep

@@ -6,7 +6,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -59,7 +58,12 @@ class PixelPieces {
 
   // Calls `visit` with one piece after the other, front to back. Points that coincide are one piece each unless
   // `mergePoints`.
-  void visit(std::span<const float> alpha, bool mergePoints, const std::function<void(const Piece&)>& visit);
+  template <class Visit>
+  void visit(std::span<const float> alpha, bool mergePoints, const Visit& visit);
+
+  // Throws Error, with the pixel's place, when its shares are more than 100 million: more than is worth the time and
+  // the memory.
+  void checkOverlaps(bool mergePoints, const Box& dataWindow, size_t pixel);
 
  private:
   void findCuts();
@@ -74,8 +78,30 @@ class PixelPieces {
   std::vector<Share> shares_;
 };
 
-// Throws Error, with the pixel's place, when its shares are more than 100 million: more than is worth the time and the
-// memory.
+// The same for a size that is known.
 void checkOverlaps(PixelPieces::Size size, const Box& dataWindow, size_t pixel);
+
+template <class Visit>
+void PixelPieces::visit(std::span<const float> alpha, bool mergePoints, const Visit& visit) {
+  if (!untidiness_.any()) {
+    for (const size_t& sample : order_) visit(meet({&sample, 1}, ranges_[sample], alpha));
+    return;
+  }
+  findCuts();
+  active_.clear();
+  size_t next = 0;
+  const auto startsAt = [&](float z) { return next < order_.size() && ranges_[order_[next]].z == z; };
+  for (size_t k = 0; k < cuts_.size(); ++k) {
+    const float z = cuts_[k];
+    std::erase_if(active_, [&](size_t sample) { return ranges_[sample].zBack <= z; });
+    const size_t first = next;
+    while (startsAt(z) && ranges_[order_[next]].isPoint()) ++next;
+    const std::span<const size_t> points = order().subspan(first, next - first);
+    if (mergePoints && !points.empty()) visit(meet(points, {z, z}, alpha));
+    for (size_t i = 0; !mergePoints && i < points.size(); ++i) visit(meet(points.subspan(i, 1), {z, z}, alpha));
+    while (startsAt(z)) active_.push_back(order_[next++]);
+    if (!active_.empty()) visit(meet(active_, {z, cuts_[k + 1]}, alpha));
+  }
+}
 
 }  // namespace fathom::deep

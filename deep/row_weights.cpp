@@ -94,7 +94,7 @@ void RowCompositor::compositeAny(size_t pixel, size_t begin, size_t end, Pixel& 
   std::fill_n(row_.premultiplied.begin() + ptrdiff_t(first), count, 0.0);
   std::fill_n(row_.seen.begin() + ptrdiff_t(first), count, 0.0);
   pieces_.set(z_.subspan(begin, count), zBack_.subspan(begin, count));
-  checkOverlaps(pieces_.size(mergePoints_), image_.dataWindow, pixel);
+  pieces_.checkOverlaps(mergePoints_, image_.dataWindow, pixel);
   pieces_.visit(alpha_.subspan(begin, count), mergePoints_, [&](const Piece& piece) {
     const double front = sum.put(piece.range, piece.alpha);
     if (findEnds_) ends.put(piece.range, piece.alpha, front, passes_);

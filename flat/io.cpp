@@ -9,6 +9,7 @@
 
 #include "flat/error.h"
 #include "flat/exr_size.h"
+#include "flat/exr_writer.h"
 #include "flat/oiio/module.h"
 #include "flat/output_file.h"
 
@@ -41,23 +42,6 @@ const OiioModule& oiio() {
   return module;
 }
 
-// Encodes `image` and puts the file in its place.
-template <class Encode>
-void writeAs(const std::string& path, const Image& image, Encode&& encode) {
-  if (image.dataWindow.empty() || image.planes.empty())
-    fail("{}: expected an image to write, found an empty one", path);
-  OutputFile file(path);
-  const auto encoded = [&] {
-    try {
-      return encode(oiio());
-    } catch (const Error& e) {
-      fail("{}: expected to be written, found: {}", path, e.what());
-    }
-  };
-  file.append(encoded());
-  file.finish();
-}
-
 }  // namespace
 
 Image read(const std::string& path, const ReadOptions& options) {
@@ -68,10 +52,13 @@ Image read(const std::string& path, const ReadOptions& options) {
 }
 
 void write(const std::string& path, const Image& image, const WriteOptions& options) {
-  writeAs(path, image, [&](const OiioModule& module) { return module.encodeExr(image, options); });
+  ExrWriter writer(path, image, image.dataWindow, options);
+  writer.write(image);
+  writer.finish();
 }
 
 void writePng(const std::string& path, const Image& image) {
+  if (image.dataWindow.empty()) fail("{}: expected an image to write, found an empty one", path);
   Image shown{{0, 0, image.dataWindow.width(), image.dataWindow.height()}, {}, {}, {}};
   shown.displayWindow = shown.dataWindow;
   const bool grey = !image.find("R");
@@ -80,7 +67,16 @@ void writePng(const std::string& path, const Image& image) {
     for (float& v : shown.planes.back().values) v = v > 0 ? std::min(v, 1.0f) : 0;
     if (grey) break;
   }
-  writeAs(path, shown, [&](const OiioModule& module) { return module.encodePng(shown); });
+  OutputFile file(path);
+  const auto encoded = [&] {
+    try {
+      return oiio().encodePng(shown);
+    } catch (const Error& e) {
+      fail("{}: expected to be written, found: {}", path, e.what());
+    }
+  };
+  file.append(encoded());
+  file.finish();
 }
 
 }  // namespace fathom::flat

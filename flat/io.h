@@ -1,5 +1,5 @@
-// Flat images in and out, through OpenImageIO: EXR chiefly, and what else it reads by extension; EXR and 8-bit PNG are
-// written.
+// Flat images in and out: read through OpenImageIO, EXR chiefly, and what else it knows by extension; written as EXR
+// (flat/exr_writer) and 8-bit PNG.
 //
 // Errors (fathom::Error) name the file, the part, what was expected and what was found. Any bytes as input end in an
 // image or an Error; the size that the header promises is checked against the limit before anything of that size is

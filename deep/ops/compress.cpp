@@ -62,7 +62,7 @@ class PixelCompression {
     const size_t first = source_.image.offsets[pixel], count = source_.image.count(pixel);
     pieces_.set(source_.z.subspan(first, count),
                 source_.zBack.empty() ? source_.zBack : source_.zBack.subspan(first, count));
-    checkOverlaps(pieces_.size(source_.mergePoints), source_.image.dataWindow, pixel);
+    pieces_.checkOverlaps(source_.mergePoints, source_.image.dataWindow, pixel);
     curve_.steps.clear();
     curve_.points.assign(1, {1, 0, 0, 0});
     parts_.clear();

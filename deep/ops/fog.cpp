@@ -50,7 +50,7 @@ class PixelFog {
     first_ = size_t(image_.offsets[pixel]);
     fog_.set(x, y);
     pieces_.set(z_.subspan(first_, count), zBack_.empty() ? zBack_ : zBack_.subspan(first_, count));
-    checkOverlaps(pieces_.size(true), image_.dataWindow, pixel);
+    pieces_.checkOverlaps(true, image_.dataWindow, pixel);
     row_ = &row;
     light_ = &light;
     passed_ = 1;

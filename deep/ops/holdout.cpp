@@ -53,7 +53,7 @@ class PixelHoldout {
       return;
     }
     pieces_.set(z_, zBack_);
-    checkOverlaps(pieces_.size(true), image_.image.dataWindow, image_.image.dataWindow.index(x, y));
+    pieces_.checkOverlaps(true, image_.image.dataWindow, image_.image.dataWindow.index(x, y));
     row_ = &row;
     passed_ = 1;
     hidden_ = 0;
@@ -65,22 +65,26 @@ class PixelHoldout {
 
   // Both runs in one, in order where they are; of the holdout, what can hide something.
   void gather(Run own, Run other) {
-    z_.clear(), zBack_.clear(), alpha_.clear(), from_.clear();
+    z_.clear(), zBack_.clear(), alpha_.clear(), from_.clear(), ranges_.clear();
     hides_ = false;
     float end = -std::numeric_limits<float>::infinity();
-    for (size_t i = own.next; i < own.end; ++i) end = std::max(end, image_.range(i).zBack);
-    while (!own.empty() || !other.empty()) {
-      if (other.empty() || (!own.empty() && image_.range(own.next).z <= holdout_.range(other.next).z)) {
-        add(image_.range(own.next), image_.alpha[own.next], own.next);
-        ++own.next;
-        continue;
-      }
-      const Range range = holdout_.range(other.next);
-      const float alpha = holdout_.alpha[other.next++];
-      if (opacity(alpha) == 0 || range.z > end) continue;
-      hides_ = true;
-      add(range, alpha, kHoldout);
+    for (size_t i = own.next; i < own.end; ++i) {
+      ranges_.push_back(image_.range(i));
+      end = std::max(end, ranges_.back().zBack);
     }
+    size_t next = 0;
+    const auto addOwn = [&] {
+      add(ranges_[next], image_.alpha[own.next + next], own.next + next);
+      ++next;
+    };
+    for (; !other.empty(); ++other.next) {
+      const Range range = holdout_.range(other.next);
+      while (next < ranges_.size() && ranges_[next].z <= range.z) addOwn();
+      if (opacity(holdout_.alpha[other.next]) == 0 || range.z > end) continue;
+      hides_ = true;
+      add(range, holdout_.alpha[other.next], kHoldout);
+    }
+    while (hides_ && next < ranges_.size()) addOwn();
   }
 
   void add(const Range& range, float alpha, size_t from) {
@@ -120,6 +124,7 @@ class PixelHoldout {
   const Samples& image_;
   const Samples& holdout_;
   bool hides_ = false;
+  std::vector<Range> ranges_;  // of the image's own samples
   std::vector<float> z_, zBack_, alpha_;
   std::vector<size_t> from_;  // the sample's number in `image`, or kHoldout
   PixelPieces pieces_;
@@ -147,7 +152,7 @@ class PixelOpacity {
     const size_t count = run.end - run.next;
     pieces_.set(samples_.z.subspan(run.next, count),
                 samples_.zBack.empty() ? samples_.zBack : samples_.zBack.subspan(run.next, count));
-    checkOverlaps(pieces_.size(true), samples_.image.dataWindow, samples_.image.dataWindow.index(x, y));
+    pieces_.checkOverlaps(true, samples_.image.dataWindow, samples_.image.dataWindow.index(x, y));
     passed_ = 1;
     reached_.reset();
     pieces_.visit(samples_.alpha.subspan(run.next, count), true, [this](const Piece& piece) { put(piece); });

@@ -99,7 +99,7 @@ void Limiter::takeApart(size_t pixel, size_t count) {
   parts_.clear();
   shares_.clear();
   pieces_.set(z_.subspan(first_, count), zBack_.empty() ? zBack_ : zBack_.subspan(first_, count));
-  checkOverlaps(pieces_.size(mergePoints_), image_.dataWindow, pixel);
+  pieces_.checkOverlaps(mergePoints_, image_.dataWindow, pixel);
   pieces_.visit(alpha_.subspan(first_, count), mergePoints_, [&](const Piece& piece) {
     parts_.push_back({piece.range, piece.alpha, piece.whole, shares_.size()});
     shares_.insert(shares_.end(), piece.shares.begin(), piece.shares.end());

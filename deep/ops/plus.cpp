@@ -21,7 +21,7 @@ class PixelEmission {
     first_ = size_t(image_.offsets[pixel]);
     const size_t count = image_.count(pixel);
     pieces_.set(z_.subspan(first_, count), zBack_.empty() ? zBack_ : zBack_.subspan(first_, count));
-    checkOverlaps(pieces_.size(true), image_.dataWindow, pixel);
+    pieces_.checkOverlaps(true, image_.dataWindow, pixel);
     row_ = &row;
     passed_ = 1;
     pieces_.visit(alpha_.subspan(first_, count), true, [this](const Piece& piece) { put(piece); });

@@ -16,7 +16,7 @@ std::vector<SampleLight> lightOf(const DeepImage& image, int x, int y) {
   const bool mergePoints = !holdsStatistics(image);
   PixelPieces pieces;
   pieces.set(image.get("Z").subspan(first, count), zBack.empty() ? zBack : zBack.subspan(first, count));
-  checkOverlaps(pieces.size(mergePoints), window, pixel);
+  pieces.checkOverlaps(mergePoints, window, pixel);
   std::vector<SampleLight> light(count);
   std::vector<bool> begun(count);
   double passed = 1;

@@ -57,11 +57,6 @@ bool describesEncoding(std::string_view name) {
   return name.starts_with("oiio:") || name.starts_with("openexr:");
 }
 
-template <class T>
-void addNumbers(OIIO::ImageSpec& spec, const std::string& name, TypeDesc::BASETYPE base, const std::vector<T>& values) {
-  if (const auto type = typeOf(values.size(), base)) spec.attribute(name, *type, values.data());
-}
-
 }  // namespace
 
 std::map<std::string, std::string> attributesOf(const OIIO::ImageSpec& spec) {
@@ -72,16 +67,6 @@ std::map<std::string, std::string> attributesOf(const OIIO::ImageSpec& spec) {
     if (auto text = textOf(attribute)) result.emplace(name, std::move(*text));
   }
   return result;
-}
-
-void addAttributes(const std::map<std::string, std::string>& attributes, OIIO::ImageSpec& spec) {
-  for (const auto& [name, text] : attributes) {
-    if (describesEncoding(name)) continue;
-    const AttributeValue value = parseAttribute(text);
-    if (const auto* ints = std::get_if<std::vector<int>>(&value)) addNumbers(spec, name, TypeDesc::INT, *ints);
-    if (const auto* floats = std::get_if<std::vector<float>>(&value)) addNumbers(spec, name, TypeDesc::FLOAT, *floats);
-    if (const auto* string = std::get_if<std::string>(&value)) spec.attribute(name, *string);
-  }
 }
 
 }  // namespace fathom::flat

@@ -12,6 +12,4 @@ namespace fathom::flat {
 // is left out.
 std::map<std::string, std::string> attributesOf(const OIIO::ImageSpec& spec);
 
-void addAttributes(const std::map<std::string, std::string>& attributes, OIIO::ImageSpec& spec);
-
 }  // namespace fathom::flat

@@ -116,21 +116,6 @@ void interleave(const Image& image, int y0, int y1, std::vector<float>& values) 
   }
 }
 
-// Ids and coverages of a Cryptomatte layer, NAME00.R and so on: ids are bits of a float.
-bool isCryptomatte(const Image& image, std::string_view name) {
-  return std::ranges::any_of(image.attributes, [&](const auto& attribute) {
-    if (!attribute.first.starts_with("cryptomatte/") || !attribute.first.ends_with("/name")) return false;
-    const AttributeValue value = parseAttribute(attribute.second);
-    const auto* layer = std::get_if<std::string>(&value);
-    return layer && name.starts_with(*layer);
-  });
-}
-
-bool needsRange(const Image& image, std::string_view name) {
-  return name == "Z" || name.starts_with("Z.") || name == "ZBack" || name.ends_with("samples") ||
-         name.find("variance") != name.npos || isCryptomatte(image, name);
-}
-
 void writeBands(OIIO::ImageOutput& output, const OIIO::ImageSpec& spec, const Image& image) {
   std::vector<float> values;
   for (int y0 = spec.y; y0 < spec.y + spec.height; y0 += kBandRows) {
@@ -184,18 +169,6 @@ Image read(const std::string& path, bool exr, const ReadOptions& options) {
   }
 }
 
-std::vector<uint8_t> encodeExr(const Image& image, const WriteOptions& options) {
-  OIIO::ImageSpec spec = specOf(image);
-  addAttributes(image.attributes, spec);
-  spec.attribute("compression", "zip");
-  // OpenImageIO would write the time of day, and the same image would never give the same bytes.
-  if (!spec.find_attribute("DateTime")) spec.attribute("DateTime", "");
-  if (options.half)
-    for (const std::string& name : spec.channelnames)
-      spec.channelformats.push_back(needsRange(image, name) ? OIIO::TypeFloat : OIIO::TypeHalf);
-  return encode("openexr", spec, image);
-}
-
 std::vector<uint8_t> encodePng(const Image& image) {
   OIIO::ImageSpec spec = specOf(image);
   spec.set_format(OIIO::TypeUInt8);
@@ -208,6 +181,6 @@ std::vector<uint8_t> encodePng(const Image& image) {
 
 extern "C" __attribute__((visibility("default"))) const fathom::flat::OiioModule* fathomOiioModule() {
   using namespace fathom::flat;
-  static const OiioModule module{FATHOM_VERSION, read, encodeExr, encodePng};
+  static const OiioModule module{FATHOM_VERSION, read, encodePng};
   return &module;
 }

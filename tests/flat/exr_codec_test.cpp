@@ -1,5 +1,5 @@
 // Packed bytes of deep chunks: what is packed unpacks to the same, at every length and from every place.
-#include "deep/exr_codec.h"
+#include "flat/exr_codec.h"
 
 #include <Imath/half.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include "flat/error.h"
 
-namespace fathom::deep {
+namespace fathom {
 namespace {
 
 using Bytes = std::vector<uint8_t>;
@@ -115,4 +115,4 @@ TEST(ExrCodec, BoundsWhatPackedBytesCanHold) {
 }
 
 }  // namespace
-}  // namespace fathom::deep
+}  // namespace fathom

@@ -1,4 +1,4 @@
-// The bytes of a deep chunk: none, RLE and ZIPS, packed and unpacked.
+// The bytes of an EXR chunk: none, RLE, ZIPS and ZIP, packed and unpacked.
 //
 // RLE and ZIPS reorder the bytes before they pack them: those at even places first, then those at odd places, then each
 // as the difference to the one before. Every value has an even number of bytes, so a channel can be put together from
@@ -11,12 +11,13 @@
 #include <span>
 #include <vector>
 
-#include "deep/io.h"
+#include "flat/buffer.h"
+#include "flat/exr_types.h"
 
 struct libdeflate_compressor;
 struct libdeflate_decompressor;
 
-namespace fathom::deep {
+namespace fathom {
 
 // Of a value in the file.
 inline size_t valueBytes(PixelType type) {
@@ -81,4 +82,4 @@ class Packer {
   Buffer<uint8_t> scratch_;
 };
 
-}  // namespace fathom::deep
+}  // namespace fathom
