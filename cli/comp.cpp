@@ -8,6 +8,7 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
 #include "cli/chain_run.h"
@@ -73,7 +74,9 @@ std::string describeArguments(const OperationSpec& spec) {
     if (!argument.fallback.empty() && argument.type != ArgumentType::Flag)
       fallback = fmt::format(" (default: {})", argument.fallback);
     std::string choices;
-    for (const std::string& choice : argument.choices) choices += (choices.empty() ? ": " : ", ") + choice;
+    for (const std::string& choice : argument.choices)
+      if (argument.help.find(argument.choices[0]) == std::string::npos)
+        choices += (choices.empty() ? ": " : ", ") + choice;
     text += fmt::format("  {:<14} {}{}{}\n", argument.type == ArgumentType::Flag ? argument.name : argument.name + "=",
                         argument.help, choices, fallback);
   }
@@ -157,12 +160,13 @@ class CompRun {
     });
   }
 
-  // Results on the standard output, failures on the other.
-  void show(const FrameDone& done, ProgressDisplay& display) const {
+  // Results on the standard output, failures on the other; what is the same for every frame once.
+  void show(const FrameDone& done, ProgressDisplay& display) {
     const bool several = sequence_.pattern.numbered();
     const std::string name = several ? fmt::format("frame {}: ", done.frame) : "";
     if (!done.error.empty()) return display.tell(fmt::format("fathom: {}{}", name, done.error));
-    for (const std::string& note : done.report.notes) display.say(name + note);
+    for (const std::string& note : done.report.notes)
+      if (said_.insert(note).second) display.say(name + note);
     if (several) display.frameDone(fmt::format("{}{}", name, done.kept ? "is there already" : "done"));
   }
 
@@ -171,6 +175,7 @@ class CompRun {
   std::string text_;
   Sequence sequence_;
   std::stop_token stop_;
+  std::set<std::string> said_;
 };
 
 void writeStatistics(const std::string& path, const std::vector<FrameDone>& done) {

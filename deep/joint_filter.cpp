@@ -199,7 +199,7 @@ class RowSum {
       for (int k = 0; k < kCandidates; ++k)
         for (size_t p = 0; p < kParts; ++p) acc[c][k][p] = hn::LoadU(d, sums + (c * kCandidates + k) * 8 + p * kLanes);
     for (size_t q = 0; q < pixels; ++q) {
-      V colour[kComponents][kColour > 0 ? kColour : 1][kParts];
+      V colour[kComponents][std::max(kColour, 1)][kParts];
       for (int c = 0; c < kComponents; ++c)
         for (int k = 0; k < kColour; ++k)
           for (size_t p = 0; p < kParts; ++p) colour[c][k][p] = Spread(d, weights[size_t(c)] + q * step + 2 * k, p);

@@ -33,12 +33,21 @@ run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/se
 run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "demo/sequence.$frame.deepref.exr" --clip 0,7 \
   --labels noisy,denoised,reference --zoom 2 --exposure -0.7 -o "$out/clipped.png"
 
+say "Smoke goes into the denoised frames: among the steps, and farther back. Nothing is rendered again, nothing held out"
+run comp "$out/sequence.####.deep.exr" demo/smoke.####.deep.exr --insert --flatten -o "$out/smoke.####.exr"
+run comp "$out/sequence.####.deep.exr" demo/smoke.####.deep.exr --insert z=2.5 --flatten -o "$out/smoke-behind.####.exr"
+run png "demo/sequence.$frame.deep.exr" "$out/sequence.$frame.deep.exr" "$out/smoke.$frame.exr" "$out/smoke-behind.$frame.exr" \
+  --labels noisy,denoised,smoke,"smoke 2.5 farther" --zoom 2 --exposure -0.7 -o "$out/smoke.png"
+run png "$out"/smoke.000[123].exr --zoom 2 --exposure -0.7 -o "$out/smoke-frames.png"
+
 cat <<TEXT
 
-The pictures: $out/frame.png, and $out/clipped.png with everything behind a depth of 7 taken away.
+The pictures: $out/frame.png; $out/clipped.png with everything behind a depth of 7 taken away; $out/smoke.png with the smoke at
+two depths, and $out/smoke-frames.png with all three frames of it.
 Next:
   build/bin/fathom info YOUR.exr                               what the denoiser would use of it, and what is missing
   build/bin/fathom denoise YOUR.####.exr -o CLEAN.####.exr     a sequence of your own
   build/bin/fathom denoise --help                              quality, memory, inputs in pieces, other channel names
+  build/bin/fathom comp --help                                 merge, holdout, clip, fog, grade, ids and what else can be chained
 docs/channels.md tells what to ask your renderer for.
 TEXT

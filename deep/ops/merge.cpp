@@ -1,6 +1,7 @@
 #include "deep/ops/merge.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <tuple>
 
@@ -47,18 +48,25 @@ struct Input {
   explicit Input(const DeepImage& from) : image(from), z(from.get("Z")), zBack(from.tryGet("ZBack")) {}
 };
 
-// The samples of one pixel of the result, front to back.
-void placePixel(std::span<const Input> inputs, int x, int y, std::vector<Placed>& placed) {
+// The samples of one pixel of the result, front to back, in `placed`. Each input's are mostly so already: they are
+// merged run by run.
+void placePixel(std::span<const Input> inputs, int x, int y, std::vector<Placed>& placed,
+                std::vector<Placed>& scratch) {
   placed.clear();
   for (size_t i = 0; i < inputs.size(); ++i) {
     const DeepImage& image = inputs[i].image;
     if (!image.dataWindow.contains(x, y)) continue;
-    const size_t pixel = image.dataWindow.index(x, y);
+    const size_t pixel = image.dataWindow.index(x, y), before = placed.size();
     for (size_t s = image.offsets[pixel]; s < image.offsets[pixel + 1]; ++s)
       placed.push_back(
           {usableRange(inputs[i].z[s], inputs[i].zBack.empty() ? inputs[i].z[s] : inputs[i].zBack[s]), Origin(i, s)});
+    const auto run = placed.begin() + std::ptrdiff_t(before);
+    if (!std::is_sorted(run, placed.end())) std::sort(run, placed.end());
+    if (before == 0 || run == placed.end() || run[-1] < *run) continue;
+    scratch.clear();
+    std::merge(placed.begin(), run, run, placed.end(), std::back_inserter(scratch));
+    placed.swap(scratch);
   }
-  if (!std::is_sorted(placed.begin(), placed.end())) std::sort(placed.begin(), placed.end());
 }
 
 bool everyInputHas(std::span<const DeepImage> inputs, const std::string& name) {
@@ -137,9 +145,9 @@ DeepImage merge(std::span<const DeepImage> images) {
   const size_t width = size_t(window.width());
   std::vector<std::vector<Origin>> rows(size_t(window.height()));
   parallelFor(0, window.height(), [&](int row) {
-    std::vector<Placed> placed;
+    std::vector<Placed> placed, scratch;
     for (size_t x = 0; x < width; ++x) {
-      placePixel(inputs, window.x0 + int(x), window.y0 + row, placed);
+      placePixel(inputs, window.x0 + int(x), window.y0 + row, placed, scratch);
       for (const Placed& sample : placed) rows[size_t(row)].push_back(sample.origin);
       result.offsets[size_t(row) * width + x + 1] = placed.size();
     }

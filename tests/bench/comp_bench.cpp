@@ -32,15 +32,17 @@ deep::DeepImage thicket(unsigned seed) {
   for (size_t p = 0; p < window.area(); ++p) image.offsets[p + 1] = image.offsets[p] + random() % 17;
   for (const char* name : {"R", "G", "B", "A"}) image.add(name, deep::PixelType::Half);
   for (const char* name : {"Z", "ZBack"}) image.add(name, deep::PixelType::Float);
+  const std::span<float> alphas = image.get("A"), z0 = image.get("Z"), z1 = image.get("ZBack");
+  const std::array<std::span<float>, 3> colours{image.get("R"), image.get("G"), image.get("B")};
   for (size_t p = 0; p < window.area(); ++p) {
     float z = 2 + unit(random);
     for (size_t s = image.offsets[p]; s < image.offsets[p + 1]; ++s) {
       z += 0.05f + 0.3f * unit(random);
       const float alpha = std::floor(256 * (0.05f + 0.6f * unit(random))) / 256;
-      image.get("A")[s] = alpha;
-      image.get("Z")[s] = z;
-      image.get("ZBack")[s] = random() % 2 ? z + 0.04f : z;
-      for (const char* name : {"R", "G", "B"}) image.get(name)[s] = std::floor(1024 * alpha * unit(random)) / 1024;
+      alphas[s] = alpha;
+      z0[s] = z;
+      z1[s] = random() % 2 ? z + 0.04f : z;
+      for (const std::span<float>& colour : colours) colour[s] = std::floor(1024 * alpha * unit(random)) / 1024;
     }
   }
   return image;
@@ -95,6 +97,7 @@ Table programs(const std::string& a, const std::string& b, const std::string& fo
       {"flatten", fmt::format("{} flatten {}{}", fathom, a, out), fmt::format("oiiotool {} --flatten{}", a, out)},
       {"holdout", fmt::format("{} holdout {} {}{}", fathom, a, b, out),
        fmt::format("oiiotool {} {} --deepholdout{}", a, b, out)},
+      {"holdout, hard", fmt::format("{} holdout {} {} hard opaque=1{}", fathom, a, b, out), ""},
       {"clip", fmt::format("{} clip {} 3 5{}", fathom, a, out), ""},
       {"copy", fmt::format("{} comp {}{}", fathom, a, out), fmt::format("oiiotool {}{}", a, out)},
   };
