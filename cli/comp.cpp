@@ -16,6 +16,7 @@
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
 #include "cli/interrupt.h"
+#include "cli/operation_words.h"
 #include "cli/peak_memory.h"
 #include "cli/progress_display.h"
 #include "flat/error.h"
@@ -53,41 +54,6 @@ Exit status: 0 all frames done, 1 some failed (one line each), 2 usage, 130 stop
 
 Operations:
 )";
-
-std::string usageOf(const OperationSpec& spec) {
-  std::string text = "--" + spec.name;
-  for (const ArgumentSpec& argument : spec.arguments) {
-    std::string word = argument.required                     ? argument.name
-                       : argument.type == ArgumentType::Flag ? argument.name
-                                                             : argument.name + "=";
-    if (argument.required)
-      std::ranges::transform(word, word.begin(), [](unsigned char c) { return char(std::toupper(c)); });
-    text += argument.required ? " " + word : " [" + word + "]";
-  }
-  return text;
-}
-
-std::string describeArguments(const OperationSpec& spec) {
-  std::string text;
-  for (const ArgumentSpec& argument : spec.arguments) {
-    std::string fallback;
-    if (!argument.fallback.empty() && argument.type != ArgumentType::Flag)
-      fallback = fmt::format(" (default: {})", argument.fallback);
-    std::string choices;
-    for (const std::string& choice : argument.choices)
-      if (argument.help.find(argument.choices[0]) == std::string::npos)
-        choices += (choices.empty() ? ": " : ", ") + choice;
-    text += fmt::format("  {:<14} {}{}{}\n", argument.type == ArgumentType::Flag ? argument.name : argument.name + "=",
-                        argument.help, choices, fallback);
-  }
-  return text;
-}
-
-std::string operationList() {
-  std::string text;
-  for (const OperationSpec& spec : operations()) text += fmt::format("  {}\n      {}\n", usageOf(spec), spec.help);
-  return text;
-}
 
 // The frames of the first numbered image, or one.
 Sequence framesOf(const Chain& chain, const std::string& range) {
@@ -257,50 +223,6 @@ void runWords(const CompCommand& command, const std::function<std::vector<std::s
   if (!command.stats.empty()) writeStatistics(command.stats, done);
   if (missing || std::ranges::any_of(done, [](const FrameDone& frame) { return !frame.error.empty(); }))
     throw Incomplete();
-}
-
-// The words of a subcommand as those of a chain: images first, then the operation with its arguments, then -o.
-std::vector<std::string> chainOfOne(const OperationSpec& spec, const std::vector<std::string>& words) {
-  std::vector<std::string> images, arguments{"--" + spec.name}, outputs;
-  const auto isArgument = [&](const std::string& name) {
-    return std::ranges::find(spec.arguments, name, &ArgumentSpec::name) != spec.arguments.end();
-  };
-  const auto isFlag = [&](const std::string& name) {
-    const auto found = std::ranges::find(spec.arguments, name, &ArgumentSpec::name);
-    return found != spec.arguments.end() && found->type == ArgumentType::Flag;
-  };
-  for (size_t i = 0; i < words.size(); ++i) {
-    std::string word = words[i];
-    const bool dashed = word.starts_with("--");
-    if (word == "-o" || word == "--output") {
-      outputs.insert(outputs.end(), {"-o", i + 1 < words.size() ? words[i + 1] : ""});
-      ++i;
-      continue;
-    }
-    if (dashed) word.erase(0, 2);
-    const size_t equals = word.find('=');
-    const std::string name = word.substr(0, equals);
-    if (name == "part" || (name == "half" && equals != word.npos && !isArgument(name))) {
-      const std::string value = equals != word.npos    ? word
-                                : i + 1 < words.size() ? word + "=" + words[++i]
-                                                       : word + "=";
-      (name == "part" ? images : outputs).push_back(value);
-    } else if (isArgument(name) && (equals != word.npos || isFlag(name))) {
-      arguments.push_back(word);
-    } else if (dashed && isArgument(name) && i + 1 < words.size()) {
-      arguments.push_back(name + "=" + words[++i]);
-    } else if (dashed) {
-      fail("{}: expected no option --{}", spec.name, name);
-    } else if (spec.more || images.size() < spec.inputs.size()) {
-      images.push_back(word);
-    } else {
-      arguments.push_back(word);
-    }
-  }
-  std::vector<std::string> chain = images;
-  chain.insert(chain.end(), arguments.begin(), arguments.end());
-  chain.insert(chain.end(), outputs.begin(), outputs.end());
-  return chain;
 }
 
 void addCommonOptions(CLI::App& app, CompCommand& command) {

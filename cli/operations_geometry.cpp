@@ -56,11 +56,6 @@ Operation makeTransform(const Arguments& arguments, std::span<const InputForm> i
   return operation;
 }
 
-Box unionOf(const Box& a, const Box& b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
-}
-
 Operation makeInsert(const Arguments& arguments, std::span<const InputForm> inputs) {
   const deep::Transform how = transformOf(arguments);
   const deep::Resampling pixels = how.resampling(deepOf(inputs[1].image).displayWindow);

@@ -19,14 +19,10 @@ namespace fathom::cli {
 
 namespace {
 
-Box unionOf(std::span<const Box> windows) {
-  Box all;
-  for (const Box& box : windows) {
-    if (box.empty()) continue;
-    if (all.empty()) all = box;
-    all = {std::min(all.x0, box.x0), std::min(all.y0, box.y0), std::max(all.x1, box.x1), std::max(all.y1, box.y1)};
-  }
-  return all.empty() ? windows[0] : all;
+Box windowOfAll(std::span<const Box> windows) {
+  Box all = windows[0];
+  for (const Box& window : windows) all = unionOf(all, window);
+  return all;
 }
 
 Operation makeMerge(const Arguments& arguments, std::span<const InputForm> inputs) {
@@ -42,7 +38,7 @@ Operation makeMerge(const Arguments& arguments, std::span<const InputForm> input
     deep::dropSampleStatistics(merged);
     return deep::tidy(std::move(merged)).image;
   };
-  operation.window = unionOf;
+  operation.window = windowOfAll;
   operation.summary = [lines = deep::describeMerge(forms)] { return lines; };
   return operation;
 }

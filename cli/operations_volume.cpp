@@ -38,11 +38,6 @@ Operation makeClipMap(const Arguments& arguments, std::span<const InputForm> inp
   }};
 }
 
-Box unionOf(const Box& a, const Box& b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
-}
-
 Operation makePlus(const Arguments&, std::span<const InputForm>) {
   Operation operation;
   operation.apply = [](std::vector<AnyImage> in) -> AnyImage {

@@ -28,4 +28,11 @@ inline Box moved(const Box& box, int x, int y) {
   return {box.x0 + x, box.y0 + y, box.x1 + x, box.y1 + y};
 }
 
+// The smallest that holds both; an empty one counts for nothing.
+inline Box unionOf(const Box& a, const Box& b) {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
+  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
+}
+
 }  // namespace fathom

@@ -15,11 +15,6 @@ namespace fathom::deep {
 
 namespace {
 
-Box unionOf(const Box& a, const Box& b) {
-  if (a.empty() || b.empty()) return a.empty() ? b : a;
-  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
-}
-
 // One image above the other, both over the same window; tidy.
 DeepImage stack(const DeepImage& upper, const DeepImage& lower, const Box& window) {
   std::vector<DeepImage> both;

@@ -34,12 +34,6 @@ struct Placed {
   }
 };
 
-Box unionOf(const Box& a, const Box& b) {
-  if (a.empty()) return b;
-  if (b.empty()) return a;
-  return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
-}
-
 // One input as the merge reads it.
 struct Input {
   const DeepImage& image;

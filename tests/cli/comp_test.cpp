@@ -70,8 +70,8 @@ TEST_F(CompCommand, GivesTheSameBitsForAnyBandsAndThreads) {
 
 TEST_F(CompCommand, ASubcommandIsAChainOfOne) {
   ASSERT_EQ(comp("hero.exr --clip 2 6 -o chain.exr").status, 0);
-  for (const char* words :
-       {"hero.exr 2 6 -o alone.exr", "-o alone.exr --near 2 --far=6 hero.exr", "hero.exr far=6 near=2 -o alone.exr"}) {
+  for (const char* words : {"hero.exr 2 6 -o alone.exr", "-o alone.exr --near 2 --far=6 hero.exr",
+                            "hero.exr far=6 near=2 -o alone.exr", "--part 0 hero.exr 2 6 -o alone.exr"}) {
     const Ran ran = runFathom(std::string("clip ") + words, "cd " + (folder_ / "") + ";");
     ASSERT_EQ(ran.status, 0) << ran.err;
     EXPECT_TRUE(textOf(folder_ / "alone.exr") == textOf(folder_ / "chain.exr")) << words;
