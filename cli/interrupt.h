@@ -1,8 +1,7 @@
 // Ctrl-C and the farm's SIGTERM as a stop token: work ends at its next step, and half-written files go with it.
 #pragma once
 
-#include <signal.h>
-
+#include <csignal>
 #include <stop_token>
 #include <thread>
 

@@ -66,6 +66,7 @@ std::vector<std::string> chainOfOne(const OperationSpec& spec, const std::vector
     if (dashed) word.erase(0, 2);
     const size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
+    const bool complete = isArgument(name) && (equals != word.npos || isFlag(name));
     if (name == "part" || (name == "half" && equals != word.npos && !isArgument(name))) {
       const std::string value = equals != word.npos    ? word
                                 : i + 1 < words.size() ? word + "=" + words[++i]
@@ -74,13 +75,11 @@ std::vector<std::string> chainOfOne(const OperationSpec& spec, const std::vector
         part = value;
       else
         (name == "part" ? images : outputs).push_back(value);
-    } else if (isArgument(name) && (equals != word.npos || isFlag(name))) {
-      arguments.push_back(word);
-    } else if (dashed && isArgument(name) && i + 1 < words.size()) {
+    } else if (dashed && !complete) {
+      if (!isArgument(name) || i + 1 == words.size())
+        fail("{}: expected an option that it has, with a value; found --{}", spec.name, name);
       arguments.push_back(name + "=" + words[++i]);
-    } else if (dashed) {
-      fail("{}: expected no option --{}", spec.name, name);
-    } else if (spec.more || images.size() < spec.inputs.size()) {
+    } else if (!complete && (spec.more || images.size() < spec.inputs.size())) {
       images.push_back(word);
       if (!part.empty()) images.push_back(std::exchange(part, ""));
     } else {
