@@ -4,11 +4,10 @@
 // the view axis tells, which stands at 0 there and at a half in the other.
 #include "deep/ppu_scale.h"
 
-#include <ImathMatrix.h>
-
 #include <cmath>
 #include <optional>
 
+#include "deep/camera_matrix.h"
 #include "flat/error.h"
 
 namespace fathom::deep {
@@ -16,14 +15,6 @@ namespace fathom::deep {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-
-std::optional<Imath::M44d> matrixOf(const Attributes& attributes, const char* name) {
-  const auto values = attributes.getMatrix(name);
-  if (!values) return {};
-  Imath::M44d matrix;
-  for (size_t i = 0; i < 16; ++i) matrix[int(i / 4)][int(i % 4)] = double((*values)[i]);
-  return matrix;
-}
 
 // Pixels per unit at depth 1, by how far apart two points are seen that lie at that depth.
 double scaleOf(const Imath::M44d& worldToCamera, const Imath::M44d& worldToNdc, int width) {

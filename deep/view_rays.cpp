@@ -1,10 +1,9 @@
 // Source: the comments of OpenEXR's ImfStandardAttributes.h.
 #include "deep/view_rays.h"
 
-#include <ImathMatrix.h>
-
 #include <cmath>
 
+#include "deep/camera_matrix.h"
 #include "deep/ppu_scale.h"
 #include "flat/error.h"
 
@@ -13,14 +12,6 @@ namespace fathom::deep {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-
-std::optional<Imath::M44d> matrixOf(const Attributes& attributes, const char* name) {
-  const auto values = attributes.getMatrix(name);
-  if (!values) return {};
-  Imath::M44d matrix;
-  for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = double((*values)[size_t(i)]);
-  return matrix;
-}
 
 std::optional<Imath::M44d> inverseOf(const std::optional<Imath::M44d>& matrix) {
   if (!matrix || !(std::abs(matrix->determinant()) > 0)) return {};

@@ -2,18 +2,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/chain_run.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/random_ops.h"
-#include "tests/reference/run_fathom.h"
+#include "tests/reference/run_chain.h"
 
 namespace fathom::cli {
 namespace {
 
 using reference::randomSamples;
+using reference::runChainIn;
 using testing::HasSubstr;
 using Words = std::vector<std::string>;
 
@@ -25,15 +25,7 @@ class ColourOperations : public testing::Test {
     deep::write(folder_ / "hero.exr", hero);
     flat::write(folder_ / "flat.exr", deep::flatten(randomSamples({.window = {-8, 5, 30, 70}, .seed = 2})));
   }
-  // Runs a chain whose files are in the folder, in bands.
-  ChainRunReport run(Words words, int bandRows) const {
-    for (std::string& word : words)
-      if (word.ends_with(".exr")) word = folder_ / word;
-    words.insert(words.end(), {"-o", folder_ / "out.exr"});
-    ChainRunParams params;
-    params.bandRows = bandRows;
-    return runChain(parseChain(words), 0, params);
-  }
+  ChainRunReport run(const Words& words, int bandRows) const { return runChainIn(folder_, words, bandRows); }
 
   TemporaryFolder folder_;
 };

@@ -2,17 +2,17 @@
 // the function that it stands for.
 #include <gtest/gtest.h>
 
-#include "cli/chain_run.h"
 #include "deep/io.h"
 #include "deep/ops/insert.h"
 #include "deep/ops/resize.h"
 #include "flat/error.h"
 #include "tests/reference/random_ops.h"
-#include "tests/reference/run_fathom.h"
+#include "tests/reference/run_chain.h"
 
 namespace fathom::cli {
 namespace {
 
+using reference::bytesOfChain;
 using reference::randomSamples;
 using Words = std::vector<std::string>;
 
@@ -26,16 +26,7 @@ class GeometryOperations : public testing::Test {
     deep::write(folder_ / "hero.exr", hero_);
     deep::write(folder_ / "smoke.exr", smoke_);
   }
-  // Runs a chain whose files are in the folder; returns the bytes of what it writes.
-  std::string bytesOf(Words words, int bandRows) const {
-    for (std::string& word : words)
-      if (word.ends_with(".exr")) word = folder_ / word;
-    words.insert(words.end(), {"-o", folder_ / "out.exr"});
-    ChainRunParams params;
-    params.bandRows = bandRows;
-    runChain(parseChain(words), 0, params);
-    return textOf(folder_ / "out.exr");
-  }
+  std::string bytesOf(const Words& words, int bandRows) const { return bytesOfChain(folder_, words, bandRows); }
 
   TemporaryFolder folder_;
   deep::DeepImage hero_, smoke_;

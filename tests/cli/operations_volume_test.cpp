@@ -3,18 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/chain_run.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "deep/ops/holdout.h"
 #include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/random_ops.h"
-#include "tests/reference/run_fathom.h"
+#include "tests/reference/run_chain.h"
 
 namespace fathom::cli {
 namespace {
 
+using reference::bytesOfChain;
 using reference::randomSamples;
 using Words = std::vector<std::string>;
 
@@ -30,16 +30,7 @@ class VolumeOperations : public testing::Test {
     deep::write(folder_ / "smoke.exr", smoke_);
     flat::write(folder_ / "flat.exr", deep::flatten(smoke_));
   }
-  // Runs a chain whose files are in the folder; returns the bytes of what it writes.
-  std::string bytesOf(Words words, int bandRows) const {
-    for (std::string& word : words)
-      if (word.ends_with(".exr")) word = folder_ / word;
-    words.insert(words.end(), {"-o", folder_ / "out.exr"});
-    ChainRunParams params;
-    params.bandRows = bandRows;
-    runChain(parseChain(words), 0, params);
-    return textOf(folder_ / "out.exr");
-  }
+  std::string bytesOf(const Words& words, int bandRows) const { return bytesOfChain(folder_, words, bandRows); }
 
   TemporaryFolder folder_;
   deep::DeepImage hero_, smoke_;
