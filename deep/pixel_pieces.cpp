@@ -1,8 +1,8 @@
 #include "deep/pixel_pieces.h"
 
 #include <algorithm>
-#include <numeric>
-#include <tuple>
+#include <cmath>
+#include <limits>
 
 #include "flat/error.h"
 
@@ -38,19 +38,19 @@ Untidiness& Untidiness::operator|=(const Untidiness& other) {
 
 void PixelPieces::set(std::span<const float> z, std::span<const float> zBack) {
   ranges_.resize(z.size());
-  bool repaired = false;
+  order_.resize(z.size());
+  const auto front = [](const Range& a, const Range& b) { return a.z < b.z || (a.z == b.z && a.zBack < b.zBack); };
+  bool repaired = false, sorted = true;
   for (size_t i = 0; i < z.size(); ++i) {
     const Range given{z[i], zBack.empty() ? z[i] : zBack[i]};
     ranges_[i] = usableRange(given.z, given.zBack);
+    order_[i] = i;
     repaired |= !(ranges_[i] == given);
+    if (i > 0 && front(ranges_[i], ranges_[i - 1])) sorted = false;
   }
-  order_.resize(z.size());
-  std::iota(order_.begin(), order_.end(), size_t(0));
-  const auto front = [&](size_t a, size_t b) {
-    return std::tie(ranges_[a].z, ranges_[a].zBack, a) < std::tie(ranges_[b].z, ranges_[b].zBack, b);
-  };
-  const bool sorted = std::is_sorted(order_.begin(), order_.end(), front);
-  if (!sorted) std::sort(order_.begin(), order_.end(), front);
+  if (!sorted)
+    std::sort(order_.begin(), order_.end(),
+              [&](size_t a, size_t b) { return front(ranges_[a], ranges_[b]) || (ranges_[a] == ranges_[b] && a < b); });
   untidiness_ = overlapsOf(ranges_, order_);
   untidiness_.unsorted = !sorted || repaired;
 }
@@ -88,27 +88,38 @@ PixelPieces::Size PixelPieces::size(bool mergePoints) {
   return size;
 }
 
-Piece PixelPieces::meet(std::span<const size_t> samples, Range range, std::span<const float> alpha) {
-  shares_.clear();
-  alphas_.clear();
+double PixelPieces::opticalDepthOf(size_t sample) {
+  if (depths_.empty()) depths_.assign(order_.size(), std::numeric_limits<double>::quiet_NaN());
+  double& depth = depths_[sample];
+  if (std::isnan(depth)) depth = opticalDepth(opacity(alpha_[sample]));
+  return depth;
+}
+
+Piece PixelPieces::alone(size_t sample) {
+  alone_ = {sample, 1, 1};
+  return {ranges_[sample], opacity(alpha_[sample]), sample, true, {&alone_, 1}};
+}
+
+Piece PixelPieces::meet(std::span<const size_t> samples, Range range) {
+  if (samples.size() == 1 && ranges_[samples[0]] == range) return alone(samples[0]);
+  const double length = double(range.zBack) - double(range.z);
+  slices_.clear();
   for (const size_t sample : samples) {
     const Range& whole = ranges_[sample];
-    const double a = opacity(alpha[sample]);
-    const double length = double(range.zBack) - double(range.z);
-    const Part part = whole == range ? Part{a, 1} : partOf(a, length / (double(whole.zBack) - double(whole.z)));
-    shares_.push_back({sample, part.weight, 1});
-    alphas_.push_back(part.alpha);
+    const double fraction = whole == range ? 1 : length / (double(whole.zBack) - double(whole.z));
+    slices_.push_back({opacity(alpha_[sample]), opticalDepthOf(sample), fraction});
   }
-  const bool whole = samples.size() == 1 && ranges_[samples[0]] == range;
-  if (samples.size() == 1) return {range, alphas_[0], samples[0], whole, shares_};
+  if (samples.size() == 1) {
+    const Part part = partOf(slices_[0]);
+    alone_ = {samples[0], part.weight, 1};
+    return {range, part.alpha, samples[0], false, {&alone_, 1}};
+  }
   weights_.resize(samples.size());
   parts_.resize(samples.size());
-  const Merged merged = merge(alphas_, weights_, parts_);
-  for (size_t i = 0; i < samples.size(); ++i) {
-    shares_[i].weight *= weights_[i];
-    shares_[i].part = parts_[i];
-  }
-  return {range, merged.alpha, samples[merged.largest], whole, shares_};
+  shares_.resize(samples.size());
+  const Merged merged = merge(slices_, weights_, parts_);
+  for (size_t i = 0; i < samples.size(); ++i) shares_[i] = {samples[i], weights_[i], parts_[i]};
+  return {range, merged.alpha, samples[merged.largest], false, shares_};
 }
 
 void checkOverlaps(PixelPieces::Size size, const Box& dataWindow, size_t pixel) {

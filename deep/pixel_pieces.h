@@ -5,6 +5,7 @@
 // overlap.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -67,15 +68,27 @@ class PixelPieces {
 
  private:
   void findCuts();
-  Piece meet(std::span<const size_t> samples, Range range, std::span<const float> alpha);
+  double opticalDepthOf(size_t sample);
+  // Whether the i-th in order, which no sample before it reaches, shares its depths with the next one.
+  bool meetsNext(size_t i, bool mergePoints) const {
+    if (!untidiness_.any() || i + 1 == order_.size()) return false;
+    const Range &range = ranges_[order_[i]], &next = ranges_[order_[i + 1]];
+    return range.isPoint() ? mergePoints && next == range : next.z < range.zBack;
+  }
+  Piece alone(size_t sample);
+  Piece meet(std::span<const size_t> samples, Range range);
 
   std::vector<Range> ranges_;
   std::vector<size_t> order_;
   Untidiness untidiness_;
   std::vector<float> cuts_;  // every Z and ZBack, once
   std::vector<size_t> active_;
-  std::vector<double> alphas_, weights_, parts_;
+  std::span<const float> alpha_;  // of the samples, while they are visited
+  std::vector<double> depths_;    // their optical depths; NaN where not looked at yet; empty where none was
+  std::vector<Slice> slices_;
+  std::vector<double> weights_, parts_;
   std::vector<Share> shares_;
+  Share alone_{};
 };
 
 // The same for a size that is known.
@@ -83,24 +96,35 @@ void checkOverlaps(PixelPieces::Size size, const Box& dataWindow, size_t pixel);
 
 template <class Visit>
 void PixelPieces::visit(std::span<const float> alpha, bool mergePoints, const Visit& visit) {
-  if (!untidiness_.any()) {
-    for (const size_t& sample : order_) visit(meet({&sample, 1}, ranges_[sample], alpha));
-    return;
-  }
-  findCuts();
-  active_.clear();
+  alpha_ = alpha;
+  depths_.clear();
+  active_.clear();  // the volumes at `z`
+  float z = 0;
   size_t next = 0;
-  const auto startsAt = [&](float z) { return next < order_.size() && ranges_[order_[next]].z == z; };
-  for (size_t k = 0; k < cuts_.size(); ++k) {
-    const float z = cuts_[k];
-    std::erase_if(active_, [&](size_t sample) { return ranges_[sample].zBack <= z; });
+  const auto startsHere = [&] { return next < order_.size() && ranges_[order_[next]].z == z; };
+  while (next < order_.size() || !active_.empty()) {
+    if (active_.empty()) {
+      if (!meetsNext(next, mergePoints)) {
+        visit(alone(order_[next++]));
+        continue;
+      }
+      z = ranges_[order_[next]].z;
+    }
     const size_t first = next;
-    while (startsAt(z) && ranges_[order_[next]].isPoint()) ++next;
+    while (startsHere() && ranges_[order_[next]].isPoint()) ++next;
     const std::span<const size_t> points = order().subspan(first, next - first);
-    if (mergePoints && !points.empty()) visit(meet(points, {z, z}, alpha));
-    for (size_t i = 0; !mergePoints && i < points.size(); ++i) visit(meet(points.subspan(i, 1), {z, z}, alpha));
-    while (startsAt(z)) active_.push_back(order_[next++]);
-    if (!active_.empty()) visit(meet(active_, {z, cuts_[k + 1]}, alpha));
+    if (mergePoints && points.size() > 1)
+      visit(meet(points, {z, z}));
+    else
+      for (const size_t point : points) visit(alone(point));
+    while (startsHere()) active_.push_back(order_[next++]);
+    if (active_.empty()) continue;
+    float end = ranges_[active_[0]].zBack;
+    for (const size_t volume : active_) end = std::min(end, ranges_[volume].zBack);
+    if (next < order_.size()) end = std::min(end, ranges_[order_[next]].z);
+    visit(meet(active_, {z, end}));
+    z = end;
+    std::erase_if(active_, [&](size_t sample) { return ranges_[sample].zBack <= z; });
   }
 }
 

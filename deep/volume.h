@@ -5,6 +5,7 @@
 // multiplied with.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <span>
 
@@ -34,14 +35,26 @@ inline Range usableRange(float z, float zBack) {
   return {point, point};
 }
 
+// How much a sample of `alpha`, in [0,1], dims what is behind it: -ln(1 - alpha), infinite for an opaque one.
+inline double opticalDepth(double alpha) {
+  return -std::log1p(-alpha);
+}
+
 // A part of a volume: its alpha, and the factor between the whole's premultiplied values and the part's.
 struct Part {
   double alpha, weight;
 };
 
-// The part of a volume of `alpha` that is `fraction` of its length. Parts of fractions that sum to 1, front over back,
-// give the volume again.
-Part partOf(double alpha, double fraction);
+// A sample as far as it covers some depths: the whole's alpha and optical depth, and what fraction of its length it is.
+struct Slice {
+  double alpha, depth, fraction;
+};
+
+// Parts of fractions that sum to 1, front over back, give the volume again.
+Part partOf(const Slice& slice);
+inline Part partOf(double alpha, double fraction) {
+  return partOf({alpha, opticalDepth(alpha), fraction});
+}
 
 // What coincident samples become together.
 struct Merged {
@@ -49,9 +62,9 @@ struct Merged {
   size_t largest;  // which of them has the largest share; the first where several have
 };
 
-// Merges samples that cover the same depths. `weights` receives the factors of their premultiplied values, whose sum is
-// the merged sample's; `shares` receives what part of its opacity each one makes up (sum 1). All spans have the same
-// size, at least 1.
-Merged merge(std::span<const double> alphas, std::span<double> weights, std::span<double> shares);
+// Merges slices that cover the same depths. `weights` receives the factors of the whole samples' premultiplied values,
+// whose sum is the merged sample's; `shares` receives what part of its opacity each one makes up (sum 1). All spans have
+// the same size, at least 1.
+Merged merge(std::span<const Slice> slices, std::span<double> weights, std::span<double> shares);
 
 }  // namespace fathom::deep

@@ -19,6 +19,7 @@ struct Origin {
   static constexpr int kBits = 48;
   uint64_t packed;
 
+  Origin() = default;
   Origin(size_t input, uint64_t sample) : packed(uint64_t(input) << kBits | sample) {}
   size_t input() const { return size_t(packed >> kBits); }
   size_t sample() const { return size_t(packed & ((uint64_t(1) << kBits) - 1)); }
@@ -28,6 +29,8 @@ struct Placed {
   Range range;
   Origin origin;
 
+  Placed() = default;
+  Placed(const Range& at, Origin from) : range(at), origin(from) {}
   bool operator<(const Placed& other) const {
     return std::tie(range.z, range.zBack, origin.packed) <
            std::tie(other.range.z, other.range.zBack, other.origin.packed);
@@ -39,7 +42,9 @@ struct Input {
   const DeepImage& image;
   std::span<const float> z, zBack;
 
-  explicit Input(const DeepImage& from) : image(from), z(from.get("Z")), zBack(from.tryGet("ZBack")) {}
+  explicit Input(const DeepImage& from) : image(from), z(from.get("Z")), zBack(from.tryGet("ZBack")) {
+    if (zBack.empty()) zBack = z;
+  }
 };
 
 // The samples of one pixel of the result, front to back, in `placed`. Each input's are mostly so already: they are
@@ -51,14 +56,14 @@ void placePixel(std::span<const Input> inputs, int x, int y, std::vector<Placed>
     const DeepImage& image = inputs[i].image;
     if (!image.dataWindow.contains(x, y)) continue;
     const size_t pixel = image.dataWindow.index(x, y), before = placed.size();
+    const float *const z = inputs[i].z.data(), *const zBack = inputs[i].zBack.data();
     for (size_t s = image.offsets[pixel]; s < image.offsets[pixel + 1]; ++s)
-      placed.push_back(
-          {usableRange(inputs[i].z[s], inputs[i].zBack.empty() ? inputs[i].z[s] : inputs[i].zBack[s]), Origin(i, s)});
+      placed.emplace_back(usableRange(z[s], zBack[s]), Origin(i, s));
     const auto run = placed.begin() + std::ptrdiff_t(before);
     if (!std::is_sorted(run, placed.end())) std::sort(run, placed.end());
     if (before == 0 || run == placed.end() || run[-1] < *run) continue;
-    scratch.clear();
-    std::merge(placed.begin(), run, run, placed.end(), std::back_inserter(scratch));
+    scratch.resize(placed.size());
+    std::merge(placed.begin(), run, run, placed.end(), scratch.begin());
     placed.swap(scratch);
   }
 }

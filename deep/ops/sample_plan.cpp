@@ -14,47 +14,50 @@ const RowPlan::Share& largest(std::span<const RowPlan::Share> shares) {
   return *std::max_element(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.part < b.part; });
 }
 
-float mixed(std::span<const RowPlan::Share> shares, Role role, const Buffer<float>& values) {
+// The values of what is made of `shares`, weighted by `factor`.
+float mixed(std::span<const RowPlan::Share> shares, float RowPlan::Share::*factor, const Buffer<float>& values) {
   double sum = 0;
-  for (const RowPlan::Share& share : shares)
-    sum += double(role == Role::Plain ? share.part : share.weight) * double(finiteOrZero(values[share.sample]));
+  for (const RowPlan::Share& share : shares) sum += double(share.*factor) * double(finiteOrZero(values[share.sample]));
   return float(sum);
 }
 
-float valueOf(const RowPlan& row, size_t i, Role role, bool back, const Buffer<float>& values) {
-  const RowPlan::Sample& sample = row.sample(i);
-  const std::span<const RowPlan::Share> shares = row.shares(i);
-  if (sample.whole) return values[shares[0].sample];
-  switch (role) {
-    case Role::Depth:
-      return back ? sample.zBack : sample.z;
-    case Role::Alpha:
-      return sample.alpha;
-    case Role::Statistic:
-      return shares.empty() ? 0 : values[largest(shares).sample];
-    default:
-      return mixed(shares, role, values);
-  }
+// Fills a row of a channel: what is kept from its source, and valueOf(i) for the i-th one made.
+template <class T, class ValueOf>
+void fill(const RowPlan& row, const Buffer<T>& from, T* to, const ValueOf& valueOf) {
+  for (const RowPlan::Run& run : row.kept()) std::copy_n(from.data() + run.from, run.count, to + run.at);
+  for (size_t i = 0; i < row.made().size(); ++i) to[row.made()[i].at] = valueOf(i);
 }
 
 void fillRow(const RowPlan& row, const Channel& from, size_t at, Channel& to) {
-  const Role role = roleOf(from);
-  const bool back = from.name == "ZBack";
-  if (role == Role::Identifier)
-    for (size_t i = 0; i < row.samples(); ++i) {
-      const std::span<const RowPlan::Share> shares = row.shares(i);
-      to.ids[at + i] = shares.empty() ? 0 : from.ids[largest(shares).sample];
-    }
-  else
-    for (size_t i = 0; i < row.samples(); ++i) to.values[at + i] = valueOf(row, i, role, back, from.values);
+  const auto ofLargest = [&](size_t i, const auto& values) {
+    return row.shares(i).empty() ? 0 : values[largest(row.shares(i)).sample];
+  };
+  const auto fillValues = [&](const auto& valueOf) { fill(row, from.values, to.values.data() + at, valueOf); };
+  switch (roleOf(from)) {
+    case Role::Identifier:
+      fill(row, from.ids, to.ids.data() + at, [&](size_t i) { return ofLargest(i, from.ids); });
+      break;
+    case Role::Statistic:
+      fillValues([&](size_t i) { return ofLargest(i, from.values); });
+      break;
+    case Role::Depth:
+      if (from.name == "ZBack")
+        fillValues([&](size_t i) { return row.made()[i].zBack; });
+      else
+        fillValues([&](size_t i) { return row.made()[i].z; });
+      break;
+    case Role::Alpha:
+      fillValues([&](size_t i) { return row.made()[i].alpha; });
+      break;
+    case Role::Plain:
+      fillValues([&](size_t i) { return mixed(row.shares(i), &RowPlan::Share::part, from.values); });
+      break;
+    default:
+      fillValues([&](size_t i) { return mixed(row.shares(i), &RowPlan::Share::weight, from.values); });
+  }
 }
 
 }  // namespace
-
-void RowPlan::mix(std::span<const Share> shares, float z, float zBack, float alpha) {
-  samples_.push_back({uint32_t(shares_.size()), false, z, zBack, alpha});
-  shares_.insert(shares_.end(), shares.begin(), shares.end());
-}
 
 DeepImage applyPlan(const DeepImage& source, const Box& window, std::span<const RowPlan> rows) {
   DeepImage result{window, source.displayWindow, Buffer<uint64_t>(window.area() + 1), {}, source.attributes};
@@ -66,7 +69,8 @@ DeepImage applyPlan(const DeepImage& source, const Box& window, std::span<const 
   parallelFor(0, int(rows.size()), [&](int y) {
     const RowPlan& row = rows[size_t(y)];
     const uint64_t begin = begins[size_t(y)];
-    for (size_t x = 0; x < width; ++x) result.offsets[size_t(y) * width + x] = begin + row.first(x);
+    for (size_t x = 0; x < width; ++x)
+      result.offsets[size_t(y) * width + x] = begin + (x < row.firsts().size() ? row.firsts()[x] : row.samples());
     for (size_t c = 0; c < source.channels.size(); ++c)
       fillRow(row, source.channels[c], size_t(begin), result.channels[c]);
   });

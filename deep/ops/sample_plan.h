@@ -25,41 +25,58 @@ class RowPlan {
     float weight;     // factor of its premultiplied values
     float part;       // of the new sample's opacity; the parts of a sample sum to 1
   };
-  struct Sample {
+  // Samples of the source that follow each other there and here.
+  struct Run {
+    uint64_t from;       // the first one in the source
+    uint32_t at, count;  // the first one in this row, and how many they are
+  };
+  struct Made {
+    uint32_t at;  // its number in this row
     uint32_t firstShare;
-    bool whole;             // bit for bit as the one share's sample was: depths and alpha are not looked at
     float z, zBack, alpha;  // of a point: zBack == z
   };
 
-  void nextPixel() { ends_.push_back(uint32_t(samples_.size())); }
-  // A sample of the source as it is.
-  void keep(uint64_t sample) { add({sample, 1, 1}, true, 0, 0, 0); }
+  void nextPixel() { firsts_.push_back(samples_); }
+  // A sample of the source as it is, bit for bit.
+  void keep(uint64_t sample) {
+    if (kept_.empty() || kept_.back().at + kept_.back().count != samples_ ||
+        kept_.back().from + kept_.back().count != sample)
+      kept_.push_back({sample, samples_, 0});
+    ++kept_.back().count;
+    ++samples_;
+  }
   // A sample of the source with other depths, alpha and weight of its values.
   void change(uint64_t sample, float z, float zBack, float alpha, float weight) {
-    add({sample, weight, 1}, false, z, zBack, alpha);
+    make(z, zBack, alpha);
+    shares_.push_back({sample, weight, 1});
   }
   // One made of several; `shares` are copied. Without any its values are 0, and only its depths and alpha say something.
-  void mix(std::span<const Share> shares, float z, float zBack, float alpha);
+  void mix(std::span<const Share> shares, float z, float zBack, float alpha) {
+    make(z, zBack, alpha);
+    shares_.insert(shares_.end(), shares.begin(), shares.end());
+  }
 
-  size_t pixels() const { return ends_.size(); }
-  size_t samples() const { return samples_.size(); }
-  // The first of the samples of the i-th pixel; samples() for i == pixels().
-  size_t first(size_t i) const { return i < ends_.size() ? ends_[i] : samples_.size(); }
-  const Sample& sample(size_t i) const { return samples_[i]; }
+  size_t samples() const { return samples_; }
+  // The first sample of each pixel.
+  std::span<const uint32_t> firsts() const { return firsts_; }
+  // Together these are the row's samples, each in order.
+  std::span<const Run> kept() const { return kept_; }
+  std::span<const Made> made() const { return made_; }
+  // What the i-th one made is made of.
   std::span<const Share> shares(size_t i) const {
-    const size_t begin = samples_[i].firstShare;
-    const size_t end = i + 1 < samples_.size() ? samples_[i + 1].firstShare : shares_.size();
+    const size_t begin = made_[i].firstShare, end = i + 1 < made_.size() ? made_[i + 1].firstShare : shares_.size();
     return {shares_.data() + begin, end - begin};
   }
 
  private:
-  void add(const Share& share, bool whole, float z, float zBack, float alpha) {
-    samples_.push_back({uint32_t(shares_.size()), whole, z, zBack, alpha});
-    shares_.push_back(share);
+  void make(float z, float zBack, float alpha) {
+    made_.push_back({samples_++, uint32_t(shares_.size()), z, zBack, alpha});
   }
 
-  std::vector<uint32_t> ends_;  // samples before each pixel
-  std::vector<Sample> samples_;
+  uint32_t samples_ = 0;
+  std::vector<uint32_t> firsts_;
+  std::vector<Run> kept_;
+  std::vector<Made> made_;
   std::vector<Share> shares_;
 };
 

@@ -10,11 +10,13 @@
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringVectorAttribute.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <tbb/global_control.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -72,11 +74,17 @@ class EveryLayout : public ::testing::TestWithParam<Layout> {
   TemporaryFolder folder_;
 };
 
+std::string nameOf(const ::testing::TestParamInfo<Layout>& test) {
+  const char* compression = std::array{"None", "Rle", "Zips"}[size_t(test.param.compression)];
+  return fmt::format("{}{}x{}", compression, test.param.tileWidth, test.param.tileHeight);
+}
+
 INSTANTIATE_TEST_SUITE_P(Io, EveryLayout,
                          ::testing::Values(Layout{Compression::None, 0, 0}, Layout{Compression::Rle, 0, 0},
                                            Layout{Compression::Zips, 0, 0}, Layout{Compression::None, 16, 16},
                                            Layout{Compression::Rle, 5, 40}, Layout{Compression::Zips, 13, 7},
-                                           Layout{Compression::Zips, 100, 100}, Layout{Compression::Zips, 1, 1}));
+                                           Layout{Compression::Zips, 100, 100}, Layout{Compression::Zips, 1, 1}),
+                         nameOf);
 
 TEST_P(EveryLayout, ComesBackBitForBit) {
   const DeepImage image = sample();

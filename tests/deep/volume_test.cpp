@@ -28,10 +28,16 @@ struct MergeOutcome {
   std::vector<double> weights, shares;
 };
 
-MergeOutcome mergeAll(const std::vector<double>& alphas) {
-  MergeOutcome outcome{{}, std::vector<double>(alphas.size()), std::vector<double>(alphas.size())};
-  outcome.merged = merge(alphas, outcome.weights, outcome.shares);
+MergeOutcome mergeSlices(const std::vector<Slice>& slices) {
+  MergeOutcome outcome{{}, std::vector<double>(slices.size()), std::vector<double>(slices.size())};
+  outcome.merged = merge(slices, outcome.weights, outcome.shares);
   return outcome;
+}
+
+MergeOutcome mergeAll(const std::vector<double>& alphas) {
+  std::vector<Slice> slices;
+  for (const double alpha : alphas) slices.push_back({alpha, opticalDepth(alpha), 1});
+  return mergeSlices(slices);
 }
 
 TEST(Volume, FrontPartOverBackPartIsTheWhole) {
@@ -79,6 +85,20 @@ TEST(Volume, MergedHalvesOfAVolumeAreTheVolume) {
     EXPECT_NEAR(outcome.merged.alpha, alpha, 1e-15 * alpha) << alpha;
     EXPECT_NEAR(half.weight * (outcome.weights[0] + outcome.weights[1]), 1, 1e-14) << alpha;
   }
+}
+
+// To what 1 - alpha of the parts keeps of alphas near 1.
+TEST(Volume, MergingSlicesIsMergingTheirParts) {
+  for (const double one : kAlphas)
+    for (const double other : kAlphas) {
+      const Slice a{one, opticalDepth(one), 0.3}, b{other, opticalDepth(other), 0.8};
+      const Part partA = partOf(a), partB = partOf(b);
+      const MergeOutcome atOnce = mergeSlices({a, b}), inTurn = mergeAll({partA.alpha, partB.alpha});
+      EXPECT_NEAR(atOnce.merged.alpha, inTurn.merged.alpha, 1e-12 * inTurn.merged.alpha) << one << ", " << other;
+      EXPECT_NEAR(atOnce.weights[0], inTurn.weights[0] * partA.weight, 1e-12) << one << ", " << other;
+      EXPECT_NEAR(atOnce.weights[1], inTurn.weights[1] * partB.weight, 1e-12) << one << ", " << other;
+      EXPECT_NEAR(atOnce.shares[0], inTurn.shares[0], 1e-12) << one << ", " << other;
+    }
 }
 
 TEST(Volume, MergedAlphaIsThatOfCompositing) {
