@@ -53,8 +53,9 @@ struct Spent {
   bool done = false;
 };
 
-// Runs a command of words without spaces, its output thrown away.
+// Runs a command of words without spaces, its output thrown away. What earlier ones wrote is on the disk by then.
 Spent spend(const std::string& command) {
+  sync();
   const auto start = std::chrono::steady_clock::now();
   const pid_t child = fork();
   if (child == 0) {

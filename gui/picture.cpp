@@ -1,0 +1,134 @@
+#include "gui/picture.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+#include "cli/chain_source.h"
+#include "deep/channels.h"
+
+namespace fathom::gui {
+
+namespace {
+
+struct NamedChannel {
+  std::string name;
+  bool identifier;
+};
+
+// "diffuse" of "diffuse.R"; empty for a channel without a dot.
+std::string prefixOf(const std::string& channel) {
+  const size_t dot = channel.rfind('.');
+  return dot == channel.npos ? "" : channel.substr(0, dot);
+}
+
+std::string suffixOf(const std::string& channel) {
+  return channel.substr(channel.rfind('.') + 1);  // npos + 1 == 0
+}
+
+// The places of these suffixes among `channels`, where all of them are there.
+std::vector<std::string> triple(const std::vector<std::string>& channels, const std::array<const char*, 3>& suffixes) {
+  std::vector<std::string> result;
+  for (const char* suffix : suffixes) {
+    const auto found = std::ranges::find(channels, suffix, suffixOf);
+    if (found == channels.end()) return {};
+    result.push_back(*found);
+  }
+  return result;
+}
+
+Layer::Kind scalarKind(const std::string& name) {
+  if (name.starts_with("variance.") || name.find(".variance") != name.npos) return Layer::Kind::Variance;
+  return name == "Z" || name == "ZBack" || name.starts_with("Z.") ? Layer::Kind::Depth : Layer::Kind::Scalar;
+}
+
+// The layers of the channels that share a prefix.
+void addLayers(const std::string& prefix, std::vector<std::string> channels, std::vector<Layer>& layers) {
+  using Kind = Layer::Kind;
+  const bool variance = prefix == "variance" || prefix.starts_with("variance.");
+  std::vector<std::string> colour = triple(channels, {"R", "G", "B"});
+  const std::vector<std::string> vector = triple(channels, {"X", "Y", "Z"});
+  const auto remove = [&](const std::vector<std::string>& names) {
+    std::erase_if(channels, [&](const std::string& name) { return std::ranges::count(names, name) > 0; });
+  };
+  if (!colour.empty()) {
+    remove(colour);
+    const auto alpha = std::ranges::find(channels, "A", suffixOf);
+    if (alpha != channels.end()) colour.push_back(*alpha);
+    layers.push_back({prefix.empty() ? (colour.size() > 3 ? "RGBA" : "RGB") : prefix, colour,
+                      variance ? Kind::Variance : Kind::Colour});
+  }
+  if (!vector.empty() && !prefix.empty()) {
+    remove(vector);
+    layers.push_back({prefix, vector, variance ? Kind::Variance : Kind::Vector});
+  }
+  for (const std::string& channel : channels) layers.push_back({channel, {channel}, scalarKind(channel)});
+}
+
+std::vector<Layer> layersOf(const std::vector<NamedChannel>& channels) {
+  std::map<std::string, std::vector<std::string>> byPrefix;
+  std::vector<Layer> identifiers, layers;
+  for (const NamedChannel& channel : channels)
+    if (channel.identifier)
+      identifiers.push_back({channel.name, {channel.name}, Layer::Kind::Identifier});
+    else
+      byPrefix[prefixOf(channel.name)].push_back(channel.name);
+  for (auto& [prefix, names] : byPrefix) addLayers(prefix, std::move(names), layers);  // "" comes first
+  layers.insert(layers.end(), identifiers.begin(), identifiers.end());
+  return layers;
+}
+
+}  // namespace
+
+const Box& Picture::dataWindow() const {
+  return std::visit([](const auto& of) -> const Box& { return of.dataWindow; }, image);
+}
+
+const Box& Picture::displayWindow() const {
+  return std::visit([](const auto& of) -> const Box& { return of.displayWindow; }, image);
+}
+
+const Layer* Picture::layer(const std::string& name) const {
+  const auto found = std::ranges::find(layers, name, &Layer::name);
+  if (found != layers.end()) return &*found;
+  return layers.empty() ? nullptr : layers.data();
+}
+
+size_t Picture::bytes() const {
+  size_t bytes = sizeof(Picture);
+  if (const flat::Image* of = flat()) bytes += of->planes.size() * of->dataWindow.area() * sizeof(float);
+  if (const deep::DeepImage* of = deep())
+    bytes += of->offsets.size() * sizeof(uint64_t) + of->channels.size() * of->samples() * sizeof(float);
+  return bytes;
+}
+
+std::vector<Layer> layersOf(const deep::DeepImage& image) {
+  std::vector<NamedChannel> channels;
+  for (const deep::Channel& channel : image.channels)
+    channels.push_back({channel.name, channel.type == deep::PixelType::Uint});
+  std::vector<Layer> layers = layersOf(channels);
+  layers.push_back({"samples per pixel", {}, Layer::Kind::Count});
+  return layers;
+}
+
+std::vector<Layer> layersOf(const flat::Image& image) {
+  std::vector<NamedChannel> channels;
+  for (const flat::Plane& plane : image.planes) channels.push_back({plane.name, false});
+  return layersOf(channels);
+}
+
+PicturePtr makePicture(std::string path, std::variant<deep::DeepImage, flat::Image> image) {
+  std::vector<Layer> layers = std::visit([](const auto& of) { return layersOf(of); }, image);
+  return std::make_shared<Picture>(Picture{std::move(path), std::move(image), std::move(layers)});
+}
+
+PicturePtr loadPicture(const std::string& path, const std::string& part, const Progress& progress) {
+  progress.at(0);
+  cli::ChainSource source(path, part, size_t(64) << 30);
+  const Box window = source.dataWindow();
+  PicturePtr picture = makePicture(path, source.read(window.y0, window.y1));
+  progress.at(1);
+  return picture;
+}
+
+}  // namespace fathom::gui

@@ -1,0 +1,47 @@
+#include "gui/session.h"
+
+#include <utility>
+
+namespace fathom::gui {
+
+namespace {
+
+// Takes the value over, and tells whether it is a new one.
+template <class T>
+bool assign(T& to, T value) {
+  if (to == value) return false;
+  to = std::move(value);
+  return true;
+}
+
+}  // namespace
+
+void Session::setA(PicturePtr picture) {
+  if (assign(a_, std::move(picture))) emit picturesChanged();
+}
+
+void Session::setB(PicturePtr picture) {
+  if (assign(b_, std::move(picture))) emit picturesChanged();
+}
+
+void Session::setView(const ViewState& view) {
+  if (assign(view_, view)) emit viewChanged();
+}
+
+void Session::setCursor(std::optional<QPoint> pixel) {
+  const std::optional<QPoint> before = this->pixel();
+  cursor_ = pixel;
+  if (before != this->pixel()) emit pixelChanged();
+}
+
+void Session::setPin(std::optional<QPoint> pixel) {
+  const std::optional<QPoint> before = this->pixel();
+  pin_ = pixel;
+  if (before != this->pixel()) emit pixelChanged();
+}
+
+void Session::setBox(std::optional<Box> box) {
+  if (assign(box_, box)) emit boxChanged();
+}
+
+}  // namespace fathom::gui

@@ -1,0 +1,56 @@
+// What is open and how it is looked at, without widgets. Panels read it, change it, and follow its signals; they know
+// nothing of one another.
+#pragma once
+
+#include <QObject>
+#include <QPoint>
+#include <QString>
+#include <optional>
+
+#include "flat/box.h"
+#include "gui/picture.h"
+#include "gui/view_state.h"
+
+namespace fathom::gui {
+
+class Session : public QObject {
+  Q_OBJECT
+
+ public:
+  using QObject::QObject;
+
+  const PicturePtr& a() const { return a_; }  // null before anything is open
+  const PicturePtr& b() const { return b_; }  // what A is compared with; null: nothing
+  const ViewState& view() const { return view_; }
+  // In pixels of the image.
+  std::optional<QPoint> cursor() const { return cursor_; }
+  std::optional<QPoint> pin() const { return pin_; }
+  std::optional<Box> box() const { return box_; }
+  // The pixel that inspectors show: the pinned one, or else that under the cursor.
+  std::optional<QPoint> pixel() const { return pin_ ? pin_ : cursor_; }
+
+  void setA(PicturePtr picture);
+  void setB(PicturePtr picture);
+  void setView(const ViewState& view);
+  void setCursor(std::optional<QPoint> pixel);
+  void setPin(std::optional<QPoint> pixel);
+  void setBox(std::optional<Box> box);
+  // A line for the status bar.
+  void say(const QString& line) { emit said(line); }
+
+ signals:
+  // Only on a change.
+  void picturesChanged();
+  void viewChanged();
+  void pixelChanged();
+  void boxChanged();
+  void said(const QString& line);
+
+ private:
+  PicturePtr a_, b_;
+  ViewState view_;
+  std::optional<QPoint> cursor_, pin_;
+  std::optional<Box> box_;
+};
+
+}  // namespace fathom::gui
