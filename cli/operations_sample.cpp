@@ -78,14 +78,18 @@ struct TidyCount {
 Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
   const auto count = std::make_shared<TidyCount>();
   deep::DeepImage form = deepOf(inputs[0].image).copy();
+  const bool pointsStay = deep::holdsStatistics(form);
   const std::vector<std::string> statistics = deep::dropSampleStatistics(form);
   Operation operation;
-  operation.scan = [count](const AnyImage& band) { count->untidiness |= deep::findUntidiness(deepOf(band)); };
-  const auto merges = [count] { return count->untidiness.pointsCoincide || count->untidiness.volumesOverlap; };
+  operation.scan = [=](const AnyImage& band) {
+    count->untidiness |= deep::findUntidiness(deepOf(band));
+    if (pointsStay) count->untidiness.pointsCoincide = false;
+  };
+  const auto splits = [count] { return count->untidiness.volumesOverlap; };
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
     deep::DeepImage& image = deepOf(in[0]);
     count->before.setSamples(image);
-    if (merges()) deep::dropSampleStatistics(image);
+    if (splits()) deep::dropSampleStatistics(image);
     if (count->untidiness.any()) image.attributes.erase("deepImageState");
     deep::DeepImage result = deep::tidy(std::move(image)).image;
     count->after.setSamples(result);
@@ -94,9 +98,9 @@ Operation makeTidy(const Arguments&, std::span<const InputForm> inputs) {
   operation.summary = [=] {
     std::vector<std::string> lines{fmt::format("{} samples, {} before{}", count->after.total(), count->before.total(),
                                                count->untidiness.any() ? "" : ", was tidy")};
-    if (merges() && !statistics.empty()) lines.push_back("samples were merged or split, so these were dropped:");
+    if (splits() && !statistics.empty()) lines.push_back("samples were merged or split, so these were dropped:");
     for (const std::string& name : statistics)
-      if (merges()) lines.back() += " " + name;
+      if (splits()) lines.back() += " " + name;
     return lines;
   };
   return operation;

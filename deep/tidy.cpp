@@ -115,13 +115,14 @@ std::vector<std::string> dropSampleStatistics(DeepImage& image) {
   return dropped;
 }
 
-TidyResult tidy(DeepImage image, bool mergePoints) {
+TidyResult tidy(DeepImage image) {
   Untidiness untidiness = findUntidiness(image);
-  untidiness.pointsCoincide &= mergePoints;
-  const std::span<const float> alpha = image.get("A");
   TidyResult result;
+  if (untidiness.volumesOverlap) result.dropped = dropSampleStatistics(image);
+  const bool mergePoints = !holdsStatistics(image);
+  untidiness.pointsCoincide &= mergePoints;
   if (!untidiness.any()) return {std::move(image), {}};
-  if (untidiness.pointsCoincide || untidiness.volumesOverlap) result.dropped = dropSampleStatistics(image);
+  const std::span<const float> alpha = image.get("A");
   DeepImage& out = result.image;
   out = {image.dataWindow, image.displayWindow, Buffer<uint64_t>(image.offsets.size(), 0), {}, image.attributes};
   out.attributes.erase("deepImageState");

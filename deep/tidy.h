@@ -35,7 +35,8 @@ struct TidyResult {
 // Ranges that cannot be used (reversed, infinite, no number) become points, a Z that is no number becomes infinity.
 // Throws Error when A or Z is missing, and when the volumes of one pixel overlap so much that their pieces would be
 // more than 100 million.
-// Without `mergePoints`, points at the same depth stay one after the other (see holdsStatistics).
-TidyResult tidy(DeepImage image, bool mergePoints = true);
+// Points at the same depth stay one after the other in an image of camera samples or bins made of them (see
+// holdsStatistics), as flatten composites them, unless its statistics are void because volumes overlap.
+TidyResult tidy(DeepImage image);
 
 }  // namespace fathom::deep

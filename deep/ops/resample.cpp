@@ -1,6 +1,5 @@
 #include "deep/ops/resample.h"
 
-#include "deep/channels.h"
 #include "deep/ops/area_mean.h"
 #include "deep/tidy.h"
 
@@ -10,10 +9,10 @@ namespace {
 
 // As an AreaMean takes it.
 DeepImage prepared(DeepImage image) {
-  const bool mergePoints = !holdsStatistics(image);
+  image = tidy(std::move(image)).image;
   dropSampleStatistics(image);
   for (const char* name : {"fathom:spp", "deepImageState"}) image.attributes.erase(name);
-  return tidy(std::move(image), mergePoints).image;
+  return image;
 }
 
 }  // namespace
