@@ -23,33 +23,38 @@ std::string Statistics::bucketName(size_t bucket) {
   return bucket == kBuckets - 1 ? fmt::format("{}+", first) : fmt::format("{}-{}", first, 2 * (first - 1));
 }
 
-void Statistics::add(const DeepImage& band) {
-  const std::span<const float> z = band.tryGet("Z"), back = band.tryGet("ZBack");
-  pixels += band.pixels();
-  samples += band.samples();
-  for (size_t pixel = 0; pixel < band.pixels(); ++pixel) {
-    const uint64_t count = band.count(pixel);
-    if (count > mostSamples) {
-      mostSamples = count;
-      mostX = band.dataWindow.x0 + int(pixel % size_t(band.dataWindow.width()));
-      mostY = band.dataWindow.y0 + int(pixel / size_t(band.dataWindow.width()));
+void Statistics::add(const DeepImage& image, const Box& box) {
+  const std::span<const float> z = image.tryGet("Z"), back = image.tryGet("ZBack");
+  pixels += box.area();
+  for (int y = box.y0; y < box.y1; ++y)
+    for (int x = box.x0; x < box.x1; ++x) {
+      const size_t pixel = image.dataWindow.index(x, y);
+      const uint64_t count = image.count(pixel);
+      samples += count;
+      if (count > mostSamples) {
+        mostSamples = count;
+        mostX = x;
+        mostY = y;
+      }
+      ++histogram[bucketOf(count)];
+      if (!z.empty()) addDepths(image.offsets[pixel], image.offsets[pixel + 1], z, back);
     }
-    ++histogram[bucketOf(count)];
-    bool sorted = true;
-    if (!z.empty())
-      for (uint64_t i = band.offsets[pixel] + 1; i < band.offsets[pixel + 1]; ++i) sorted = sorted && z[i - 1] <= z[i];
-    unsortedPixels += !sorted;
-  }
-  for (size_t i = 0; i < z.size(); ++i) {
-    const float end = back.empty() ? z[i] : back[i];
-    if (!std::isfinite(z[i]) || !std::isfinite(end)) {
+}
+
+void Statistics::addDepths(uint64_t begin, uint64_t end, std::span<const float> z, std::span<const float> back) {
+  bool sorted = true;
+  for (uint64_t i = begin; i < end; ++i) {
+    sorted = sorted && (i == begin || z[i - 1] <= z[i]);
+    const float last = back.empty() ? z[i] : back[i];
+    if (!std::isfinite(z[i]) || !std::isfinite(last)) {
       ++badDepths;
       continue;
     }
-    volumes += end > z[i];
+    volumes += last > z[i];
     nearest = std::min(nearest, z[i]);
-    farthest = std::max({farthest, z[i], end});
+    farthest = std::max({farthest, z[i], last});
   }
+  unsortedPixels += !sorted;
 }
 
 }  // namespace fathom::deep

@@ -27,7 +27,12 @@ struct Statistics {
 
   static std::string bucketName(size_t bucket);
   // The channels Z and ZBack are looked at where the band has them.
-  void add(const DeepImage& band);
+  void add(const DeepImage& band) { add(band, band.dataWindow); }
+  // The pixels of `box` alone, which lies inside of the data window.
+  void add(const DeepImage& image, const Box& box);
+
+ private:
+  void addDepths(uint64_t begin, uint64_t end, std::span<const float> z, std::span<const float> back);
 };
 
 }  // namespace fathom::deep

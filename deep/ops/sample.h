@@ -1,6 +1,7 @@
 // One deep pixel, sample by sample: what is seen of each.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "deep/image.h"
@@ -17,5 +18,9 @@ struct SampleLight {
 // the same in front of them, but in images of camera samples one follows the other (see holdsStatistics). Throws Error
 // where A or Z is missing and where the pixel is outside of the data window.
 std::vector<SampleLight> lightOf(const DeepImage& image, int x, int y);
+
+// What passes through all that stands in front of each of these depths, points at that depth not included; inside of
+// volumes it falls exponentially. Throws Error where A or Z is missing and where the pixel is outside of the data window.
+std::vector<double> passingTo(const DeepImage& image, int x, int y, std::span<const float> depths);
 
 }  // namespace fathom::deep

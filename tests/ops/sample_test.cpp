@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "cli/sample_report.h"
+#include "deep/clip.h"
 #include "deep/flatten.h"
 #include "flat/error.h"
 #include "tests/reference/deep_samples.h"
@@ -53,6 +54,24 @@ TEST(Sample, WhatIsInFrontIsTheTransmittanceThere) {
         }
       }
   }
+}
+
+TEST(Sample, WhatPassesToAnyDepth) {
+  const std::vector<float> depths{-1, 0.5f, 1, 1.25f, 2, 2.1f, 3.3f, 5, 7, 100};
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const DeepImage image = randomSamples(
+        {.seed = seed, .volumes = seed % 2 == 0, .most = 9, .odd = seed % 3 == 0, .sorted = seed % 4 != 0});
+    for (size_t d = 0; d < depths.size(); ++d) {
+      const flat::Image front = flatten(clip(image, -std::numeric_limits<float>::infinity(), depths[d]));
+      for (size_t p = 0; p < image.pixels(); ++p) {
+        const int width = image.dataWindow.width(), x = image.dataWindow.x0 + int(p) % width,
+                  y = image.dataWindow.y0 + int(p) / width;
+        ASSERT_NEAR(passingTo(image, x, y, depths)[d], 1 - front.get("A").values[p], 1e-6)
+            << "seed " << seed << " pixel " << p << " depth " << depths[d];
+      }
+    }
+  }
+  EXPECT_THROW(passingTo(makeDeep({{}}, 1), 4, -2, depths), Error);
 }
 
 TEST(Sample, OutsideIsAnError) {

@@ -1,0 +1,68 @@
+#include "deep/depth_axis.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace fathom::deep {
+
+namespace {
+
+constexpr double kRoom = 0.04;  // of the axis, on each side
+
+// The smallest 1, 2 or 5 times a power of ten that is at least `step`.
+double roundStep(double step) {
+  const double power = std::pow(10, std::floor(std::log10(step)));
+  for (const double factor : {1.0, 2.0, 5.0})
+    if (factor * power >= step * (1 - 1e-9)) return factor * power;
+  return 10 * power;
+}
+
+std::vector<double> evenTicks(const DepthAxis& axis, int most) {
+  const double length = axis.far - axis.near;
+  double step = roundStep(length / most);
+  if (std::floor(axis.far / step) - std::ceil(axis.near / step) + 1 > most) step = roundStep(step * 1.5);
+  std::vector<double> result;
+  for (double i = std::ceil(axis.near / step); i * step <= axis.far; ++i) result.push_back(i * step);
+  return result;
+}
+
+std::vector<double> powerTicks(const DepthAxis& axis, std::initializer_list<double> factors, double every) {
+  std::vector<double> result;
+  const double first = std::floor(std::log10(axis.near) / every) * every;
+  for (double exponent = first; exponent <= std::log10(axis.far); exponent += every)
+    for (const double factor : factors) {
+      const double depth = factor * std::pow(10, exponent);
+      if (depth >= axis.near && depth <= axis.far) result.push_back(depth);
+    }
+  return result;
+}
+
+}  // namespace
+
+std::vector<float> cellPlanes(const DepthAxis& axis, int cells) {
+  std::vector<float> planes(size_t(cells) + 1);
+  for (size_t i = 0; i < planes.size(); ++i) planes[i] = float(axis.depth(double(i) / cells));
+  planes.front() = float(axis.near);
+  planes.back() = std::nextafter(float(axis.far), std::numeric_limits<float>::infinity());
+  return planes;
+}
+
+DepthAxis axisAround(double nearest, double farthest, bool logarithmic) {
+  if (!(nearest <= farthest)) return {};
+  if (logarithmic && nearest > 0) {
+    const double room = std::max(std::pow(farthest / nearest, kRoom), 1.0005);
+    return {nearest / room, farthest * room, true};
+  }
+  const double room = std::max({kRoom * (farthest - nearest), 0.0005 * std::abs(nearest), 1e-30});
+  return {nearest - room, farthest + room, false};
+}
+
+std::vector<double> ticks(const DepthAxis& axis, int most) {
+  if (!axis.logarithmic || axis.far < 10 * axis.near) return evenTicks(axis, most);
+  std::vector<double> result = powerTicks(axis, {1, 2, 5}, 1);
+  for (double every = 1; int(result.size()) > most; every = every < 2 ? 2 : 2 * every)
+    result = powerTicks(axis, {1}, every);
+  return result;
+}
+
+}  // namespace fathom::deep
