@@ -54,7 +54,10 @@ void addLayers(const std::string& prefix, std::vector<std::string> channels, std
   if (!colour.empty()) {
     remove(colour);
     const auto alpha = std::ranges::find(channels, "A", suffixOf);
-    if (alpha != channels.end()) colour.push_back(*alpha);
+    if (alpha != channels.end()) {
+      colour.push_back(*alpha);
+      channels.erase(alpha);
+    }
     layers.push_back({prefix.empty() ? (colour.size() > 3 ? "RGBA" : "RGB") : prefix, colour,
                       variance ? Kind::Variance : Kind::Colour});
   }

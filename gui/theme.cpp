@@ -1,0 +1,48 @@
+#include "gui/theme.h"
+
+#include <QApplication>
+#include <QPalette>
+#include <QStyleFactory>
+
+namespace fathom::gui {
+
+namespace {
+
+QPalette darkPalette() {
+  const QColor window(46, 46, 46), base(34, 34, 34), text(214, 214, 214), faint(128, 128, 128), accent(196, 128, 48);
+  QPalette palette;
+  palette.setColor(QPalette::Window, window);
+  palette.setColor(QPalette::WindowText, text);
+  palette.setColor(QPalette::Base, base);
+  palette.setColor(QPalette::AlternateBase, QColor(40, 40, 40));
+  palette.setColor(QPalette::Text, text);
+  palette.setColor(QPalette::PlaceholderText, faint);
+  palette.setColor(QPalette::Button, QColor(58, 58, 58));
+  palette.setColor(QPalette::ButtonText, text);
+  palette.setColor(QPalette::BrightText, Qt::white);
+  palette.setColor(QPalette::ToolTipBase, base);
+  palette.setColor(QPalette::ToolTipText, text);
+  palette.setColor(QPalette::Highlight, accent);
+  palette.setColor(QPalette::HighlightedText, Qt::black);
+  palette.setColor(QPalette::Link, accent.lighter());
+  palette.setColor(QPalette::Light, QColor(78, 78, 78));
+  palette.setColor(QPalette::Midlight, QColor(66, 66, 66));
+  palette.setColor(QPalette::Mid, QColor(40, 40, 40));
+  palette.setColor(QPalette::Dark, QColor(28, 28, 28));
+  palette.setColor(QPalette::Shadow, QColor(16, 16, 16));
+  for (const QPalette::ColorRole role : {QPalette::WindowText, QPalette::Text, QPalette::ButtonText})
+    palette.setColor(QPalette::Disabled, role, QColor(104, 104, 104));
+  return palette;
+}
+
+}  // namespace
+
+void applyTheme(QApplication& application) {
+  application.setStyle(QStyleFactory::create("Fusion"));
+  application.setPalette(darkPalette());
+  application.setStyleSheet(
+      "QToolBar { border: 0; spacing: 4px; padding: 2px; } QDockWidget::title { padding: 4px; }"
+      "QStatusBar::item { border: 0; }");
+}
+
+}  // namespace fathom::gui

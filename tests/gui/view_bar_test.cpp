@@ -1,0 +1,69 @@
+// The bar above the picture, by its keys and fields.
+#include "gui/view_bar.h"
+
+#include <gtest/gtest.h>
+
+#include <QAction>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QtTest>
+
+namespace fathom::gui {
+namespace {
+
+PicturePtr picture(const std::vector<std::string>& channels) {
+  const Box window{0, 0, 1, 1};
+  deep::DeepImage image{window, window, Buffer<uint64_t>(2, 0), {}, {}};
+  for (const std::string& name : channels) image.add(name, deep::PixelType::Float);
+  return makePicture("a.exr", std::move(image));
+}
+
+class ViewBarTest : public ::testing::Test {
+ protected:
+  ViewBarTest() : bar_(session_) {
+    session_.setA(picture({"A", "B", "G", "R", "Z", "N.X", "N.Y", "N.Z"}));
+    bar_.show();
+  }
+  std::string layer() const { return session_.view().layer; }
+  Session session_;
+  ViewBar bar_;
+};
+
+TEST_F(ViewBarTest, ListsTheLayersOfThePicture) {
+  auto* layers = bar_.findChild<QComboBox*>();
+  EXPECT_EQ(layers->count(), 4);  // RGBA, Z, N, samples per pixel
+  EXPECT_EQ(layers->currentText(), "RGBA");
+  session_.setA(picture({"A", "Z"}));
+  EXPECT_EQ(layers->count(), 3);
+}
+
+TEST_F(ViewBarTest, StepsThroughLayersInACircle) {
+  bar_.nextLayer();
+  EXPECT_EQ(layer(), "Z");
+  bar_.previousLayer();
+  bar_.previousLayer();
+  EXPECT_EQ(layer(), "samples per pixel");
+}
+
+TEST_F(ViewBarTest, AChannelAloneAndBack) {
+  QAction* red = bar_.isolateActions()[1];
+  red->trigger();
+  EXPECT_EQ(session_.view().isolate, Isolate::Red);
+  EXPECT_TRUE(red->isChecked());
+  red->trigger();
+  EXPECT_EQ(session_.view().isolate, Isolate::All);
+  EXPECT_TRUE(bar_.isolateActions()[0]->isChecked());
+}
+
+TEST_F(ViewBarTest, TypedExposureIsTheView) {
+  auto* exposure = bar_.findChildren<QDoubleSpinBox*>()[0];
+  exposure->selectAll();
+  QTest::keyClicks(exposure, "1.5");
+  QTest::keyClick(exposure, Qt::Key_Return);
+  EXPECT_EQ(session_.view().display.exposure, 1.5f);
+  bar_.changeExposure(-0.5);
+  EXPECT_EQ(exposure->value(), 1);
+}
+
+}  // namespace
+}  // namespace fathom::gui
