@@ -6,6 +6,7 @@
 #include <new>
 
 #include "cli/content_hash.h"
+#include "cli/stopwatch.h"
 #include "flat/error.h"
 
 namespace fathom::cli {

@@ -2,7 +2,6 @@
 // Bands overlap by the rows that decide a result, so that the bits do not depend on them.
 #pragma once
 
-#include <chrono>
 #include <memory>
 #include <optional>
 #include <set>
@@ -12,14 +11,6 @@
 #include "cli/denoise_sequence.h"
 
 namespace fathom::cli {
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 struct Band {
   int y0, y1;

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "cli/denoise_chunks.h"
+#include "cli/stopwatch.h"
 #include "flat/error.h"
 #include "flat/progress.h"
 
