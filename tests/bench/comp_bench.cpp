@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,37 +15,12 @@
 #include "deep/io.h"
 #include "flat/io.h"
 #include "tests/bench/measure.h"
+#include "tests/bench/thicket.h"
 
 namespace fathom::bench {
 namespace {
 
 constexpr int kWidth = 1920, kHeight = 1080, kRepeats = 3;
-
-// A thicket before a smooth ground: 0 to 16 samples a pixel, half of them thin volumes; grainy half-float colours, as a
-// render has them.
-deep::DeepImage thicket(unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> unit(0, 1);
-  const Box window{0, 0, kWidth, kHeight};
-  deep::DeepImage image{window, window, Buffer<uint64_t>(window.area() + 1, 0), {}, {}};
-  for (size_t p = 0; p < window.area(); ++p) image.offsets[p + 1] = image.offsets[p] + random() % 17;
-  for (const char* name : {"R", "G", "B", "A"}) image.add(name, deep::PixelType::Half);
-  for (const char* name : {"Z", "ZBack"}) image.add(name, deep::PixelType::Float);
-  const std::span<float> alphas = image.get("A"), z0 = image.get("Z"), z1 = image.get("ZBack");
-  const std::array<std::span<float>, 3> colours{image.get("R"), image.get("G"), image.get("B")};
-  for (size_t p = 0; p < window.area(); ++p) {
-    float z = 2 + unit(random);
-    for (size_t s = image.offsets[p]; s < image.offsets[p + 1]; ++s) {
-      z += 0.05f + 0.3f * unit(random);
-      const float alpha = std::floor(256 * (0.05f + 0.6f * unit(random))) / 256;
-      alphas[s] = alpha;
-      z0[s] = z;
-      z1[s] = random() % 2 ? z + 0.04f : z;
-      for (const std::span<float>& colour : colours) colour[s] = std::floor(1024 * alpha * unit(random)) / 1024;
-    }
-  }
-  return image;
-}
 
 struct Spent {
   double seconds = 0, megabytes = 0;
@@ -141,8 +115,8 @@ Table chain(const std::string& a, const std::string& b, const std::string& folde
 
 int run(const std::string& folder) {
   const std::string a = folder + "/comp-a.exr", b = folder + "/comp-b.exr";
-  deep::write(a, thicket(1));
-  deep::write(b, thicket(2));
+  deep::write(a, thicket(kWidth, kHeight, 1));
+  deep::write(b, thicket(kWidth, kHeight, 2));
   const std::vector<Table> tables = {programs(a, b, folder), chain(a, b, folder)};
   for (const Table& table : tables) table.print();
   writeJson(folder + "/comp.json", tables);

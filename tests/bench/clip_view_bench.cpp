@@ -1,0 +1,57 @@
+// What a plane that is dragged through a deep frame costs: the view that is drawn again, and the histogram beside it.
+#include "deep/clip_view.h"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include "deep/clip.h"
+#include "deep/flatten.h"
+#include "tests/bench/measure.h"
+#include "tests/bench/thicket.h"
+
+namespace fathom::bench {
+namespace {
+
+constexpr int kWidth = 1920, kHeight = 1080, kRepeats = 9;
+
+Table measure() {
+  const deep::DeepImage image = thicket(kWidth, kHeight, 1);
+  const float infinity = std::numeric_limits<float>::infinity();
+  struct Case {
+    std::string name;
+    deep::DepthRange range;
+  };
+  const std::vector<Case> cases = {
+      {"all", {}},
+      {"from 3.01", {3.01f, infinity}},
+      {"3.01 to 3.51", {3.01f, 3.51f}},
+      {"3.01 to 3.51, soft", {3.01f, 3.51f, 0.1f}},
+      {"3.01 to 3.51, inverted", {3.01f, 3.51f, 0, true}},
+  };
+  std::vector<std::function<void()>> runs;
+  for (const Case& one : cases)
+    for (const int step : {2, 1})
+      runs.emplace_back([&image, &one, step] {
+        deep::clipView(image, image.dataWindow, step, one.range, {"R", "G", "B", "A"});
+      });
+  runs.emplace_back([&] { deep::flatten(deep::clip(image, 3.01f, 3.51f)); });
+  const std::vector<double> seconds = interleavedMedians(runs, kRepeats);
+  Table table(fmt::format("Clipped views, {} x {}, {} samples of R G B A Z ZBack, {} threads", kWidth, kHeight,
+                          image.samples(), tbb::this_task_arena::max_concurrency()),
+              {"range", "half resolution ms", "full ms"});
+  for (size_t i = 0; i < cases.size(); ++i)
+    table.add({cases[i].name, 1000 * seconds[2 * i], 1000 * seconds[2 * i + 1]});
+  table.add({"3.01 to 3.51, by clip and flatten", "-", 1000 * seconds.back()});
+  return table;
+}
+
+}  // namespace
+}  // namespace fathom::bench
+
+int main(int argc, char** argv) {
+  if (argc != 3) return fmt::print(stderr, "usage: bench_clip_view DEMO_FOLDER OUTPUT_FOLDER\n"), 2;
+  using namespace fathom::bench;
+  const std::vector<Table> tables = {measure()};
+  for (const Table& table : tables) table.print();
+  writeJson(std::string(argv[2]) + "/clip_view.json", tables);
+}
