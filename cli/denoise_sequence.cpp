@@ -20,7 +20,7 @@ namespace {
 // The stages together, and what is told of them.
 class SequenceRun {
  public:
-  SequenceRun(DenoiseJob job, ProgressDisplay& display, const std::stop_token& stop)
+  SequenceRun(DenoiseJob job, ProgressSink& display, const std::stop_token& stop)
       : job_(std::move(job)),
         display_(display),
         stop_(stop),
@@ -113,7 +113,7 @@ class SequenceRun {
   }
 
   DenoiseJob job_;
-  ProgressDisplay& display_;
+  ProgressSink& display_;
   const std::stop_token stop_;
   ChunkReader reader_;
   ChunkWriter writer_;
@@ -124,7 +124,7 @@ class SequenceRun {
 
 }  // namespace
 
-std::vector<FrameReport> denoiseSequence(DenoiseJob job, ProgressDisplay& display, const std::stop_token& stop) {
+std::vector<FrameReport> denoiseSequence(DenoiseJob job, ProgressSink& display, const std::stop_token& stop) {
   return SequenceRun(std::move(job), display, stop).run();
 }
 

@@ -8,7 +8,7 @@
 #include "cli/denoise_plan.h"
 #include "cli/frame_sink.h"
 #include "cli/frame_source.h"
-#include "cli/progress_display.h"
+#include "cli/progress_sink.h"
 
 namespace fathom::cli {
 
@@ -38,6 +38,6 @@ struct FrameReport {
 };
 
 // One report per frame. A frame that fails leaves no output and does not stop the others. Throws Cancelled.
-std::vector<FrameReport> denoiseSequence(DenoiseJob job, ProgressDisplay& display, const std::stop_token& stop);
+std::vector<FrameReport> denoiseSequence(DenoiseJob job, ProgressSink& display, const std::stop_token& stop);
 
 }  // namespace fathom::cli

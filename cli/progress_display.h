@@ -5,21 +5,22 @@
 #include <mutex>
 #include <string>
 
+#include "cli/progress_sink.h"
+
 namespace fathom::cli {
 
-class ProgressDisplay {
+class ProgressDisplay : public ProgressSink {
  public:
   explicit ProgressDisplay(size_t frames);
-  ~ProgressDisplay();
+  ~ProgressDisplay() override;
 
-  // The frame that is worked on is done by this fraction.
-  void at(double fraction);
-  // A frame is done (or failed): the line is shown where there is no bar.
-  void frameDone(const std::string& line);
+  void at(double fraction) override;
+  // The line is shown where there is no bar.
+  void frameDone(const std::string& line) override;
   // A line of a result, on the standard output, above the bar.
   void say(const std::string& line);
-  // A line for the user that is no result: on stderr, above the bar.
-  void tell(const std::string& line);
+  // On stderr, above the bar.
+  void tell(const std::string& line) override;
 
  private:
   void draw(double fraction);

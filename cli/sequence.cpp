@@ -151,6 +151,25 @@ std::vector<int> framesOnDisk(const FilePattern& pattern) {
   return frames;
 }
 
+std::optional<NumberedFile> findNumber(const std::string& path) {
+  constexpr size_t kMostDigits = 9;                // what an int holds
+  const size_t name = path.find_last_of('/') + 1;  // npos + 1 == 0
+  for (size_t end = path.rfind('.'); end != path.npos && end > name; end = path.rfind('.', end - 1)) {
+    size_t begin = end;
+    while (begin > name && isDigit(path[begin - 1])) --begin;
+    const bool alone = begin == name || std::string_view("._-").find(path[begin - 1]) != std::string_view::npos;
+    if (begin == end || end - begin > kMostDigits || !alone) continue;
+    NumberedFile file{{path.substr(0, begin), path.substr(end), int(end - begin)},
+                      std::stoi(path.substr(begin, end - begin))};
+    FilePattern unpadded = file.pattern;
+    unpadded.width = 1;
+    if (path[begin] != '0' && framesOnDisk(unpadded).size() > framesOnDisk(file.pattern).size())
+      file.pattern = std::move(unpadded);
+    return file;
+  }
+  return {};
+}
+
 Sequence findSequence(const std::string& path, const std::string& range) {
   Sequence sequence{parsePattern(path), {}, {}};
   if (!sequence.pattern.numbered()) {

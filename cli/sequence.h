@@ -2,6 +2,7 @@
 // disk.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,17 @@ struct FilePattern {
 
 // Throws Error where the name has more than one place for a number.
 FilePattern parsePattern(const std::string& path);
+
+// A file's name taken as that of a frame: "beauty.0042.exr" is number 42 of beauty.####.exr.
+struct NumberedFile {
+  FilePattern pattern;
+  int frame;
+};
+
+// The last number of the name that stands between a dot, dash or underscore (or the name's beginning) and a dot. Where
+// it does not say how many digits its neighbours have (10 after 9 or 09?), as most files beside it have it. Nothing
+// where there is none.
+std::optional<NumberedFile> findNumber(const std::string& path);
 
 // "1-100x2", "7", "1,3,5-9", "-5-5": ascending, without repetitions. Throws Error with the part that it does not
 // understand.

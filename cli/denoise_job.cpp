@@ -1,0 +1,170 @@
+#include "cli/denoise_job.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "deep/one_bin.h"
+#include "flat/error.h"
+
+namespace fathom::cli {
+
+namespace {
+
+[[noreturn]] void usage(const std::string& option, const std::string& text) {
+  throw CLI::ValidationError(option, text);
+}
+
+// A pattern for one of the files of a request; it has a place for the number where the input has one.
+FilePattern outputPattern(const std::string& option, const std::string& path, const FilePattern& input) {
+  FilePattern pattern = parsePattern(path);
+  if (!path.ends_with(".exr")) usage(option, fmt::format("expected a name that ends in .exr, found {}", path));
+  if (pattern.numbered() != input.numbered())
+    usage(option,
+          fmt::format("expected a {} name like the input's, found {}", input.numbered() ? "numbered" : "plain", path));
+  return pattern;
+}
+
+// "a.####.exr" becomes "a.diffuse.####.exr", "a.exr" becomes "a.diffuse.exr".
+FilePattern beside(const FilePattern& output, const std::string& component) {
+  FilePattern result = output;
+  if (!output.numbered())
+    result.before = output.before.substr(0, output.before.size() - 4) + "." + component + ".exr";
+  else if (output.before.ends_with('_'))
+    result.before += component + "_";
+  else
+    result.before += (output.before.ends_with('.') ? "" : ".") + component + ".";
+  return result;
+}
+
+FrameInputs inputsAt(const DenoiseRequest& request, int frame) {
+  const auto at = [&](const std::string& path) { return path.empty() ? path : parsePattern(path).at(frame); };
+  FrameInputs inputs{at(request.input), at(request.features), {}, at(request.alpha)};
+  for (size_t i = 0; i < request.halves.size(); ++i) inputs.halves[i] = at(request.halves[i]);
+  return inputs;
+}
+
+std::vector<DenoiseFrame> framesOf(const DenoiseRequest& request, const Sequence& sequence) {
+  const FilePattern output = outputPattern("-o", request.output, sequence.pattern);
+  std::vector<DenoiseFrame> frames;
+  for (const int number : sequence.frames) {
+    DenoiseFrame frame{number, inputsAt(request, number), {}};
+    frame.outputs.image = output.at(number);
+    if (!request.flattened.empty())
+      frame.outputs.flattened = outputPattern("--flat", request.flattened, sequence.pattern).at(number);
+    if (request.components)
+      for (const char* component : {"diffuse", "specular"})
+        frame.outputs.components[component] = beside(output, component).at(number);
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+bool sameFile(const std::string& a, const std::string& b) {
+  std::error_code none;
+  return a == b || std::filesystem::equivalent(a, b, none);
+}
+
+// Before hours of work: that no input is overwritten, and that there is a place for the outputs.
+void checkOutputs(const DenoiseFrame& frame) {
+  const std::vector<std::string> outputs = frame.outputs.files();
+  for (size_t i = 0; i < outputs.size(); ++i) {
+    for (const std::string& input : frame.inputs.files())
+      if (sameFile(input, outputs[i])) usage("-o", fmt::format("expected another file than the input {}", input));
+    for (size_t k = 0; k < i; ++k)
+      if (sameFile(outputs[k], outputs[i]))
+        usage("-o", fmt::format("expected different files, found {} twice", outputs[i]));
+    const std::string folder = std::filesystem::path(outputs[i]).parent_path().string();
+    if (access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+      fail("{}: cannot write there: {}", outputs[i], std::strerror(errno));
+  }
+}
+
+// All that decides what comes out, beside the plan and the contents of the inputs.
+std::string describeSettings(const DenoiseRequest& request, const SourceOptions& source) {
+  std::string text = fmt::format("part {} features {} halves {} alpha {}", request.part, !request.features.empty(),
+                                 request.halves.size(), !request.alpha.empty());
+  if (source.map)
+    for (const ChannelMap::Line& line : source.map->lines) {
+      text += fmt::format("\n{} ={}", line.ours, line.unpremultiplied ? " unpremultiplied" : "");
+      for (const ChannelMap::Term& term : line.terms) text += fmt::format(" {} {}", term.sign, term.theirs);
+    }
+  return text;
+}
+
+SourceOptions sourceOptions(const DenoiseRequest& request) {
+  SourceOptions source;
+  source.part = request.part;
+  if (!request.map.empty()) source.map = readChannelMap(request.map);
+  source.memory = request.memory;
+  return source;
+}
+
+// The main file of the first frame if it is not there yet: the plan may read it for the denoiser, too.
+std::string firstToDo(const DenoiseJob& job) {
+  const DenoiseFrame& frame = job.frames.front();
+  return std::filesystem::exists(frame.outputs.image) ? "" : frame.inputs.main;
+}
+
+// The job without its plan.
+DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequence, bool overlap) {
+  DenoiseJob job;
+  job.frames = framesOf(request, sequence);
+  for (const DenoiseFrame& frame : job.frames) checkOutputs(frame);
+  job.source = sourceOptions(request);
+  job.memory = request.memory;
+  job.overlap = overlap;
+  job.overwrite = request.overwrite;
+  job.settings = describeSettings(request, job.source);
+  return job;
+}
+
+// From the first frame of the sequence on disk, whether it is among the job's or not.
+SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, const SourceOptions& source,
+                      const std::string& wanted) {
+  std::vector<FrameInputs> candidates;
+  for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
+    candidates.push_back(inputsAt(request, frame));
+  SequencePlan plan = planSequence(candidates, source, request.params, wanted);
+  if (!plan.deep && !request.flattened.empty())
+    fail("{}: expected a deep file for --flat, found a flat one", request.input);
+  if (request.components && !plan.denoise.inputs.components)
+    fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
+  return plan;
+}
+
+// A flat frame as it would be written.
+flat::Image toFlatFrame(deep::DeepImage image, std::map<std::string, std::string> attributes) {
+  deep::unmakeOneBin(image);
+  flat::Image flat = deep::toFlat(image);
+  flat.attributes = std::move(attributes);
+  return flat;
+}
+
+}  // namespace
+
+DenoiseJob makeDenoiseJob(const DenoiseRequest& request, const Sequence& sequence, bool overlap) {
+  DenoiseJob job = jobWithoutPlan(request, sequence, overlap);
+  job.plan = makePlan(request, sequence, job.source, firstToDo(job));
+  return job;
+}
+
+AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, int frame, const Progress& progress) {
+  const SourceOptions options = sourceOptions(request);
+  const FrameInputs inputs = inputsAt(request, frame);
+  SequencePlan plan = makePlan(request, sequence, options, inputs.main);
+  progress.at(0);
+  FrameSource source = openFrame(inputs, options, plan);
+  std::set<std::string> notes;
+  deep::DeepImage image =
+      plan.firstImage && plan.first == inputs.main ? std::move(*plan.firstImage) : source.read(notes);
+  image = deep::denoise(std::move(image), plan.denoise, progress);
+  if (plan.deep) return image;
+  return toFlatFrame(std::move(image), source.flatAttributes());
+}
+
+}  // namespace fathom::cli

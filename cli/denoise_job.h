@@ -1,0 +1,34 @@
+// What is asked of the denoiser, by a command line or a window, made into the work on a sequence.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/denoise_sequence.h"
+#include "cli/load_image.h"
+#include "cli/sequence.h"
+#include "flat/progress.h"
+
+namespace fathom::cli {
+
+// Files are names or patterns, numbered as the input is; empty: none. The options of `fathom denoise`.
+struct DenoiseRequest {
+  std::string input, output, flattened;
+  std::string features, alpha;
+  std::vector<std::string> halves;  // none or two
+  std::string map, part;
+  deep::DenoiseParams params;
+  bool components = false;
+  bool overwrite = false;
+  size_t memory = size_t(8) << 30;
+};
+
+// The frames of `sequence`, which is that of the input, or a part of it. The plan comes from the first frame on disk,
+// whether it is among them or not. Throws Error, and CLI::ValidationError where outputs are named in a way that cannot
+// be.
+DenoiseJob makeDenoiseJob(const DenoiseRequest& request, const Sequence& sequence, bool overlap);
+
+// One frame denoised in memory, as the job would write it; outputs are not looked at. Throws Error and Cancelled.
+AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, int frame, const Progress& progress);
+
+}  // namespace fathom::cli

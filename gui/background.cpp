@@ -1,0 +1,72 @@
+#include "gui/background.h"
+
+#include <QMetaObject>
+#include <exception>
+#include <new>
+
+#include "flat/error.h"
+
+namespace fathom::gui {
+
+QString describeException() {
+  try {
+    throw;
+  } catch (const Cancelled&) {
+    return {};
+  } catch (const std::bad_alloc&) {
+    return QStringLiteral("expected more memory than there is");
+  } catch (const std::exception& e) {
+    return QString::fromStdString(oneLine(e.what()));
+  }
+}
+
+Background::Background(QObject* parent) : QObject(parent) {
+  thread_.setMaxThreadCount(1);
+}
+
+Background::~Background() {
+  stop_.request_stop();
+  thread_.waitForDone();
+}
+
+void Background::run(Work work) {
+  if (running_)
+    waiting_ = std::move(work);
+  else
+    start(std::move(work));
+}
+
+void Background::clear() {
+  waiting_ = nullptr;
+  ++generation_;
+  stop_.request_stop();
+}
+
+void Background::start(Work work) {
+  running_ = true;
+  stop_ = std::stop_source();
+  thread_.start([this, work = std::move(work), generation = generation_, token = stop_.get_token()]() mutable {
+    Deliver deliver;
+    QString error;
+    try {
+      deliver = work(Progress{{}, token});
+    } catch (...) {
+      error = describeException();
+    }
+    work = nullptr;  // what it holds goes in this thread
+    QMetaObject::invokeMethod(
+        this, [this, generation, deliver, error] { arrived(generation, deliver, error); }, Qt::QueuedConnection);
+  });
+}
+
+void Background::arrived(uint64_t generation, const Deliver& deliver, const QString& error) {
+  running_ = false;
+  if (waiting_) start(std::exchange(waiting_, nullptr));
+  if (generation == generation_) {
+    if (!error.isEmpty()) emit failed(error);
+    if (deliver) deliver();
+  }
+  if (!running_) emit idle();
+}
+
+}  // namespace fathom::gui

@@ -1,0 +1,52 @@
+// Work in the background of which only the newest matters.
+#pragma once
+
+#include <QObject>
+#include <QString>
+#include <QThreadPool>
+#include <functional>
+#include <stop_token>
+
+#include "flat/progress.h"
+
+namespace fathom::gui {
+
+// The exception that is being handled, as one line.
+QString describeException();
+
+// One thing runs at a time. What waits is replaced by what comes later.
+class Background : public QObject {
+  Q_OBJECT
+
+ public:
+  // What is called with the result, in the thread that this lives in.
+  using Deliver = std::function<void()>;
+  // Runs in another thread; Error and other exceptions become failed(), Cancelled nothing.
+  using Work = std::function<Deliver(const Progress& progress)>;
+
+  explicit Background(QObject* parent = nullptr);
+  // Waits for what runs.
+  ~Background() override;
+
+  // Replaces what waits. What runs comes to its end and delivers: a slider that is dragged shows what it can.
+  void run(Work work);
+  // What waits is forgotten, what runs is asked to stop and does not deliver.
+  void clear();
+  bool busy() const { return running_; }
+
+ signals:
+  void failed(const QString& line);
+  void idle();
+
+ private:
+  void start(Work work);
+  void arrived(uint64_t generation, const Deliver& deliver, const QString& error);
+
+  bool running_ = false;
+  Work waiting_;
+  uint64_t generation_ = 0;  // of what may still deliver
+  std::stop_source stop_;
+  QThreadPool thread_;
+};
+
+}  // namespace fathom::gui

@@ -1,0 +1,177 @@
+#include "gui/frames.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "flat/error.h"
+
+namespace fathom::gui {
+
+std::string Source::at(int frame) const {
+  const std::string file = pattern.at(frame);
+  return made.isEmpty() ? file : file + " (" + made.toStdString() + ")";
+}
+
+Found findSource(const QString& path, bool asSequence) {
+  const std::string name = path.toStdString();
+  if (std::error_code none; std::filesystem::exists(name, none)) {
+    const std::optional<cli::NumberedFile> number = asSequence ? cli::findNumber(name) : std::nullopt;
+    if (number && number->pattern.at(number->frame) == name)
+      if (std::vector<int> frames = cli::framesOnDisk(number->pattern); frames.size() > 1)
+        return {{number->pattern, std::move(frames), {}}, number->frame};
+    return {{{name, "", 0}, {0}, {}}, 0};
+  }
+  cli::Sequence sequence = cli::findSequence(name);
+  const int first = sequence.frames.front();
+  return {{std::move(sequence.pattern), std::move(sequence.frames), {}}, first};
+}
+
+Frames::Frames(Session& session, QObject* parent, FrameCache::Load load)
+    : QObject(parent), session_(session), cache_(nullptr, std::move(load)) {
+  player_.setReady([this](int frame) { return ready(frame) && !(stageBusy_ && stageBusy_()); });
+  const auto follow = [this] {
+    want();
+    show();
+  };
+  connect(&player_, &Player::frameChanged, this, follow);
+  connect(&player_, &Player::rangeChanged, this, &Frames::want);
+  connect(&player_, &Player::settingsChanged, this, &Frames::want);
+  connect(&player_, &Player::playingChanged, this, &Frames::want);
+  connect(&cache_, &FrameCache::loaded, this, &Frames::show);
+  connect(&cache_, &FrameCache::failed, this, &Frames::readFailed);
+}
+
+bool Frames::ready(int frame) const {
+  const auto settled = [&](const std::optional<Source>& of) {
+    return !of || !of->made.isEmpty() || cache_.settled(of->at(frame));
+  };
+  return settled(a_) && settled(b_);
+}
+
+bool Frames::cached(int frame) const {
+  return a_ && cache_.find(a_->at(frame)) && (!b_ || !b_->made.isEmpty() || cache_.find(b_->at(frame)));
+}
+
+void Frames::setStage(Show show, std::function<bool()> busy) {
+  stage_ = std::move(show);
+  stageBusy_ = std::move(busy);
+  if (originalA_) showA(originalA_);
+}
+
+void Frames::showA(PicturePtr picture) {
+  originalA_ = picture;
+  if (stage_)
+    stage_(std::move(picture));
+  else
+    session_.setA(std::move(picture));
+}
+
+// The frames of A are played, or else those of B.
+void Frames::setFrames(int frame) {
+  const std::optional<Source>& leading = b_ && b_->isSequence() && !(a_ && a_->isSequence()) ? b_ : a_;
+  if (!leading) return;
+  if (leading->frames != player_.frames())
+    player_.setFrames(leading->frames, frame);
+  else
+    player_.setFrame(frame);
+}
+
+void Frames::want() {
+  std::vector<std::string> paths;
+  const auto add = [&](int frame) {
+    for (const std::optional<Source>* source : {&a_, &b_}) {
+      if (!*source) continue;
+      std::string path = (*source)->at(frame);
+      // What was made cannot be read again.
+      if (!(*source)->made.isEmpty() && !cache_.find(path)) continue;
+      if (std::ranges::find(paths, path) == paths.end()) paths.push_back(std::move(path));
+    }
+  };
+  add(player_.frame());
+  const size_t shown = paths.size();
+  for (const int frame : player_.ahead(player_.frames().size())) add(frame);
+  cache_.want(std::move(paths), shown);
+}
+
+// Both together, so that frames that do not belong together are never compared.
+void Frames::show() {
+  const int frame = player_.frame();
+  if (!ready(frame)) return;
+  PicturePtr picture = a_ ? cache_.find(a_->at(frame)) : nullptr;
+  if (picture) before_.reset();
+  if (picture && picture != originalA_) showA(picture);
+  if (!picture && a_ && !a_->made.isEmpty()) session_.say(tr("no %1").arg(QString::fromStdString(a_->at(frame))));
+  session_.setB(b_ ? cache_.find(b_->at(frame)) : nullptr);
+}
+
+void Frames::readFailed(const std::string& path, const QString& reason) {
+  session_.say(reason);
+  const int frame = player_.frame();
+  if (before_ && a_ && !a_->isSequence() && a_->at(frame) == path) {
+    const Before before = *std::exchange(before_, {});
+    a_ = before.a;
+    player_.setFrames(before.frames, before.frame);
+    emit sourcesChanged();
+    want();
+  } else if (b_ && !b_->isSequence() && b_->at(frame) == path && !cache_.find(path)) {
+    closeB();
+  }
+  show();
+}
+
+void Frames::setResult(const std::string& file, const QString& made, PicturePtr picture) {
+  if (!a_ || !a_->made.isEmpty() || std::ranges::none_of(a_->frames, [&](int f) { return a_->at(f) == file; })) return;
+  Source source = *a_;
+  source.made = made;
+  cache_.put(file + " (" + made.toStdString() + ")", std::move(picture));
+  b_ = std::move(source);
+  emit sourcesChanged();
+  want();
+  show();
+}
+
+void Frames::open(const QString& path) {
+  try {
+    Found found = findSource(path);
+    if (!before_) before_ = Before{a_, player_.frames(), player_.frame()};
+    a_ = std::move(found.source);
+    if (b_ && !b_->made.isEmpty()) b_.reset();
+    setFrames(found.frame);
+  } catch (const std::exception& e) {
+    return session_.say(QString::fromStdString(e.what()));
+  }
+  emit sourcesChanged();
+  want();
+  show();
+}
+
+void Frames::openB(const QString& path) {
+  try {
+    b_ = findSource(path, a_ && a_->isSequence()).source;
+    setFrames(player_.frame());
+  } catch (const std::exception& e) {
+    return session_.say(QString::fromStdString(e.what()));
+  }
+  emit sourcesChanged();
+  want();
+  show();
+}
+
+void Frames::closeB() {
+  if (!b_) return;
+  b_.reset();
+  emit sourcesChanged();
+  want();
+  show();
+}
+
+void Frames::swap() {
+  if (!a_ || !b_) return;
+  std::swap(a_, b_);
+  emit sourcesChanged();
+  want();
+  show();
+}
+
+}  // namespace fathom::gui
