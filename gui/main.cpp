@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "flat/error.h"
 #include "gui/main_window.h"
 
 int main(int argc, char** argv) {
@@ -13,15 +12,18 @@ int main(int argc, char** argv) {
   QApplication::setOrganizationName("fathom");
   CLI::App options("fathom-view: see what is inside a deep pixel");
   std::vector<std::string> files;
+  size_t memory = size_t(8) << 30;
   options.set_version_flag("--version", "fathom-view " FATHOM_VERSION);
   options.add_option("files", files, "the image or sequence to look at, and one to compare it with")->expected(0, 2);
+  options
+      .add_option("--memory", memory, "How much memory pictures may take: frames of a sequence are kept up to there")
+      ->transform(CLI::AsSizeValue(false).description(""))
+      ->default_str("8G");
   CLI11_PARSE(options, argc, argv);
   fathom::gui::MainWindow window;
-  try {
-    if (!files.empty()) window.session().setA(fathom::gui::loadPicture(files[0]));
-  } catch (const fathom::Error& e) {
-    window.session().say(e.what());
-  }
+  window.frames().cache().setLimit(memory);
+  if (!files.empty()) window.frames().open(QString::fromStdString(files[0]));
+  if (files.size() > 1) window.frames().openB(QString::fromStdString(files[1]));
   window.show();
   return QApplication::exec();
 }

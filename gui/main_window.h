@@ -3,6 +3,8 @@
 
 #include <QMainWindow>
 
+#include "gui/frames.h"
+#include "gui/jobs.h"
 #include "gui/session.h"
 
 namespace fathom::gui {
@@ -14,9 +16,13 @@ class MainWindow : public QMainWindow {
   explicit MainWindow(QWidget* parent = nullptr);
 
   Session& session() { return session_; }
+  Frames& frames() { return frames_; }
+  Jobs& jobs() { return jobs_; }
 
  private:
   Session session_;
+  Frames frames_{session_};
+  Jobs jobs_;
 };
 
 }  // namespace fathom::gui
