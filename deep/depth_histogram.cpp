@@ -29,8 +29,8 @@ struct Depths {
 struct Extent {
   double first = kInfinity, last = -kInfinity;
 
-  void put(double depth, DepthScale scale) {
-    if (!std::isfinite(depth) || (scale == DepthScale::Log && depth <= 0)) return;
+  void put(double depth, bool logarithmic) {
+    if (!std::isfinite(depth) || (logarithmic && depth <= 0)) return;
     first = std::min(first, depth);
     last = std::max(last, depth);
   }
@@ -45,12 +45,12 @@ class Spreader {
  public:
   Spreader(const DepthAxis& axis, int bins) : axis_(axis), edges_(size_t(bins) + 1), bins_(size_t(bins), 0.0) {
     for (int i = 0; i <= bins; ++i) edges_[size_t(i)] = axis.depth(double(i) / bins);
-    edges_.front() = axis.first;
-    edges_.back() = axis.last;
+    edges_.front() = axis.near;
+    edges_.back() = axis.far;
   }
 
   void put(const Range& range, double weight) {
-    const double begin = std::max(double(range.z), axis_.first), end = std::min(double(range.zBack), axis_.last);
+    const double begin = std::max(double(range.z), axis_.near), end = std::min(double(range.zBack), axis_.far);
     if (range.isPoint()) {
       if (begin == end) bins_[binOf(begin)] += weight;
       return;
@@ -80,17 +80,7 @@ class Spreader {
 
 }  // namespace
 
-double DepthAxis::place(double depth) const {
-  if (scale == DepthScale::Linear) return (depth - first) / (last - first);
-  return depth > 0 ? std::log(depth / first) / std::log(last / first) : -kInfinity;
-}
-
-double DepthAxis::depth(double place) const {
-  if (scale == DepthScale::Linear) return first + place * (last - first);
-  return first * std::pow(last / first, place);
-}
-
-DepthAxis depthAxis(const DeepImage& image, DepthScale scale) {
+DepthAxis axisOf(const DeepImage& image, bool logarithmic) {
   const Depths depths(image);
   const int height = image.dataWindow.height();
   std::vector<Extent> tiles(size_t(height / kRows + 1));
@@ -98,19 +88,14 @@ DepthAxis depthAxis(const DeepImage& image, DepthScale scale) {
     const size_t width = size_t(image.dataWindow.width());
     Extent extent;
     for (size_t i = image.offsets[size_t(y0) * width]; i < image.offsets[size_t(y1) * width]; ++i) {
-      extent.put(double(depths.range(i).z), scale);
-      extent.put(double(depths.range(i).zBack), scale);
+      extent.put(double(depths.range(i).z), logarithmic);
+      extent.put(double(depths.range(i).zBack), logarithmic);
     }
     tiles[size_t(y0 / kRows)] = extent;
   });
   Extent all;
   for (const Extent& tile : tiles) all.put(tile);
-  const bool log = scale == DepthScale::Log;
-  if (all.first > all.last) return log ? DepthAxis{scale, 0.1, 10} : DepthAxis{};
-  if (log) all.first = std::max(all.first, all.last / kDecades);
-  if (all.first < all.last) return {scale, all.first, all.last};
-  const double room = log ? 0.1 * all.last : std::max(0.5, 0.1 * std::abs(all.last));
-  return {scale, all.first - room, all.last + room};
+  return axisAround(logarithmic ? std::max(all.first, all.last / kDecades) : all.first, all.last, logarithmic);
 }
 
 std::vector<double> depthHistogram(const DeepImage& image, const DepthAxis& axis, int bins, DepthWeight weight,

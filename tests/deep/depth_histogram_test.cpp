@@ -64,8 +64,8 @@ TEST(DepthHistogram, IsWhatASlowOneSays) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const reference::Pixels pixels = stacks(seed);
     const DeepImage image = makeDeep(pixels, 3);
-    for (const DepthAxis& axis : {DepthAxis{DepthScale::Linear, -0.3, 20.7}, DepthAxis{DepthScale::Linear, 1.1, 2.9},
-                                  DepthAxis{DepthScale::Log, 0.05, 30}, DepthAxis{DepthScale::Log, 1.1, 2.9}})
+    for (const DepthAxis& axis :
+         {DepthAxis{-0.3, 20.7}, DepthAxis{1.1, 2.9}, DepthAxis{0.05, 30, true}, DepthAxis{1.1, 2.9, true}})
       for (const DepthWeight weight : {DepthWeight::Seen, DepthWeight::Samples}) {
         const auto found = depthHistogram(image, axis, 37, weight), slow = slowHistogram(pixels, axis, 37, weight);
         ASSERT_EQ(found.size(), 37u);
@@ -79,8 +79,8 @@ TEST(DepthHistogram, OfAllDepthsSumsUpToAlphaAndSamples) {
   double alpha = 0;
   const flat::Image flattened = flatten(image);
   for (const float a : flattened.get("A").values) alpha += double(a);
-  for (const DepthScale scale : {DepthScale::Linear, DepthScale::Log}) {
-    const DepthAxis axis = depthAxis(image, scale);
+  for (const bool logarithmic : {false, true}) {
+    const DepthAxis axis = axisOf(image, logarithmic);
     EXPECT_NEAR(total(depthHistogram(image, axis, 100, DepthWeight::Seen)), alpha, 1e-5);
     EXPECT_NEAR(total(depthHistogram(image, axis, 100, DepthWeight::Samples)), double(image.samples()), 1e-9);
   }
@@ -88,44 +88,39 @@ TEST(DepthHistogram, OfAllDepthsSumsUpToAlphaAndSamples) {
 
 TEST(DepthHistogram, AVolumeIsSpreadAlongItsLength) {
   const DeepImage image = makeDeep({{{2, 6, 0.5f}}}, 1);
-  const auto bins = depthHistogram(image, {DepthScale::Linear, 0, 8}, 4, DepthWeight::Seen);
+  const auto bins = depthHistogram(image, {0, 8}, 4, DepthWeight::Seen);
   for (const size_t bin : {0u, 3u}) EXPECT_EQ(bins[bin], 0);
   for (const size_t bin : {1u, 2u}) EXPECT_NEAR(bins[bin], 0.25, 1e-12);
 }
 
 TEST(DepthHistogram, InfiniteDepthsAreLeftOut) {
   const DeepImage image = makeDeep({{{1, 1, 0.5f}, {2, 2, 0.5f}, {kInfinity, kInfinity, 1}}}, 1);
-  EXPECT_EQ(depthAxis(image, DepthScale::Linear), (DepthAxis{DepthScale::Linear, 1, 2}));
-  EXPECT_NEAR(total(depthHistogram(image, {DepthScale::Linear, 0, 3}, 5, DepthWeight::Seen)), 0.75, 1e-12);
-  EXPECT_NEAR(total(depthHistogram(image, {DepthScale::Linear, 1, 2}, 5, DepthWeight::Seen)), 0.75, 1e-12);
+  const DepthAxis axis = axisOf(image, false);
+  EXPECT_NEAR(axis.near, 1, 0.1);
+  EXPECT_NEAR(axis.far, 2, 0.1);
+  EXPECT_NEAR(total(depthHistogram(image, {0, 3}, 5, DepthWeight::Seen)), 0.75, 1e-12);
+  EXPECT_NEAR(total(depthHistogram(image, {1, 2}, 5, DepthWeight::Seen)), 0.75, 1e-12);
 }
 
 TEST(DepthHistogram, AnswersForImagesWithoutDepths) {
   const DeepImage nothing = makeDeep({{}, {}}, 2), one = makeDeep({{{4, 4, 1}}}, 1),
                   before = makeDeep({{{-2, 0, 1}}}, 1);
-  EXPECT_EQ(depthAxis(nothing, DepthScale::Linear), (DepthAxis{DepthScale::Linear, 0, 1}));
-  EXPECT_EQ(depthAxis(nothing, DepthScale::Log), (DepthAxis{DepthScale::Log, 0.1, 10}));
-  EXPECT_EQ(depthAxis(before, DepthScale::Log), (DepthAxis{DepthScale::Log, 0.1, 10}));
+  for (const bool logarithmic : {false, true}) EXPECT_EQ(axisOf(nothing, logarithmic), DepthAxis());
+  EXPECT_EQ(axisOf(before, true), DepthAxis());
   EXPECT_EQ(total(depthHistogram(nothing, {}, 8, DepthWeight::Seen)), 0);
-  for (const DepthScale scale : {DepthScale::Linear, DepthScale::Log}) {
-    const DepthAxis axis = depthAxis(one, scale);
-    EXPECT_LT(axis.first, 4);
-    EXPECT_GT(axis.last, 4);
+  for (const bool logarithmic : {false, true}) {
+    const DepthAxis axis = axisOf(one, logarithmic);
+    EXPECT_LT(axis.near, 4);
+    EXPECT_GT(axis.far, 4);
     EXPECT_EQ(total(depthHistogram(one, axis, 8, DepthWeight::Seen)), 1);
   }
-}
-
-TEST(DepthHistogram, PlacesAndDepthsAreInverse) {
-  for (const DepthAxis& axis : {DepthAxis{DepthScale::Linear, -3, 8}, DepthAxis{DepthScale::Log, 0.01, 500}})
-    for (const double place : {-0.5, 0.0, 0.3, 1.0, 1.5}) EXPECT_NEAR(axis.place(axis.depth(place)), place, 1e-12);
-  EXPECT_EQ((DepthAxis{DepthScale::Log, 1, 2}).place(0), -double(kInfinity));
 }
 
 TEST(DepthHistogram, HasTheSameBitsForAnyNumberOfThreadsAndCanBeStopped) {
   const DeepImage image = makeDeep(stacks(2), 3);
   const auto histogram = [&](size_t threads) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    return depthHistogram(image, depthAxis(image, DepthScale::Log), 50, DepthWeight::Seen);
+    return depthHistogram(image, axisOf(image, true), 50, DepthWeight::Seen);
   };
   EXPECT_EQ(histogram(1), histogram(4));
   std::stop_source stop;
@@ -139,7 +134,7 @@ TEST(DepthHistogram, NamesTheChannelThatIsMissing) {
   EXPECT_THROW(depthHistogram(image, {}, 8, DepthWeight::Seen), Error);
   EXPECT_NO_THROW(depthHistogram(image, {}, 8, DepthWeight::Samples));
   image.erase("Z");
-  EXPECT_THROW(depthAxis(image, DepthScale::Linear), Error);
+  EXPECT_THROW(axisOf(image, false), Error);
 }
 
 }  // namespace
