@@ -45,6 +45,8 @@ cat <<TEXT
 The pictures: $out/frame.png; $out/clipped.png with everything behind a depth of 7 taken away; $out/smoke.png with the smoke at
 two depths, and $out/smoke-frames.png with all three frames of it.
 Next:
+  build/bin/fathom-view $out/sequence.####.deep.exr demo/sequence.####.ref.exr
+                                                               the result beside the reference; slide a clip plane through it
   build/bin/fathom info YOUR.exr                               what the denoiser would use of it, and what is missing
   build/bin/fathom denoise YOUR.####.exr -o CLEAN.####.exr     a sequence of your own
   build/bin/fathom denoise --help                              quality, memory, inputs in pieces, other channel names
