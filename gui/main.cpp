@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gui/main_window.h"
+#include "gui/theme.h"
 
 int main(int argc, char** argv) {
   QApplication application(argc, argv);
@@ -20,7 +21,9 @@ int main(int argc, char** argv) {
       ->transform(CLI::AsSizeValue(false).description(""))
       ->default_str("8G");
   CLI11_PARSE(options, argc, argv);
+  fathom::gui::applyTheme(application);
   fathom::gui::MainWindow window;
+  window.restore();
   window.frames().cache().setLimit(memory);
   if (!files.empty()) window.frames().open(QString::fromStdString(files[0]));
   if (files.size() > 1) window.frames().openB(QString::fromStdString(files[1]));

@@ -1,13 +1,18 @@
 // The window: a canvas, panels around it, menus and keys. What happens, happens in the session and in the panels.
 #pragma once
 
+#include <QKeySequence>
 #include <QMainWindow>
+#include <functional>
 
 #include "gui/frames.h"
 #include "gui/jobs.h"
 #include "gui/session.h"
 
 namespace fathom::gui {
+
+class RecentFiles;
+class ViewBar;
 
 class MainWindow : public QMainWindow {
   Q_OBJECT
@@ -19,10 +24,34 @@ class MainWindow : public QMainWindow {
   Frames& frames() { return frames_; }
   Jobs& jobs() { return jobs_; }
 
+  // Places of the panels as they were when the last window was closed.
+  void restore();
+
+ protected:
+  void dragEnterEvent(QDragEnterEvent* event) override;
+  // The first file is A, a second one B; with Shift held, the first is B.
+  void dropEvent(QDropEvent* event) override;
+  void closeEvent(QCloseEvent* event) override;
+
  private:
+  void addPanels();
+  void addMenus();
+  void addFileMenu();
+  void addViewMenu();
+  void addDepthMenu();
+  void addCompareMenu();
+  void addFrameMenu();
+  void addWindowMenu();
+  void addHelpMenu();
+  void askForFile(const QString& title, void (Frames::*open)(const QString&));
+  void setComparison(Comparison comparison);
+  void follow();
+
   Session session_;
   Frames frames_{session_};
   Jobs jobs_;
+  ViewBar* viewBar_;
+  RecentFiles* recent_;
 };
 
 }  // namespace fathom::gui
