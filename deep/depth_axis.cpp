@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kRoom = 0.04;  // of the axis, on each side
 
+constexpr double kLeast = 1e-6;  // length of an axis, of the depths on it
+
 // The smallest 1, 2 or 5 times a power of ten that is at least `step`.
 double roundStep(double step) {
   const double power = std::pow(10, std::floor(std::log10(step)));
@@ -55,6 +57,14 @@ DepthAxis axisAround(double nearest, double farthest, bool logarithmic) {
   }
   const double room = std::max({kRoom * (farthest - nearest), 0.0005 * std::abs(nearest), 1e-30});
   return {nearest - room, farthest + room, false};
+}
+
+DepthAxis zoomed(const DepthAxis& axis, const DepthAxis& whole, double place, double factor) {
+  DepthAxis result = axis;
+  result.near = std::max(axis.depth(place - place * factor), whole.near);
+  result.far = std::min(axis.depth(place + (1 - place) * factor), whole.far);
+  const double least = kLeast * std::max(std::abs(result.near), std::abs(result.far));
+  return result.far - result.near > least ? result : axis;
 }
 
 std::vector<double> ticks(const DepthAxis& axis, int most) {

@@ -29,6 +29,10 @@ std::vector<float> cellPlanes(const DepthAxis& axis, int cells);
 // all depths are positive. Where there are none (nearest > farthest), from 0 to 1.
 DepthAxis axisAround(double nearest, double farthest, bool logarithmic);
 
+// The axis `factor` times as long, with the depth at `place` where it is; within `whole`, which is as logarithmic, and not
+// so short that its depths are the same FLOAT.
+DepthAxis zoomed(const DepthAxis& axis, const DepthAxis& whole, double place, double factor);
+
 // At most `most` round depths on the axis, in order: multiples of 1, 2 or 5 times a power of ten. For a logarithmic axis
 // that spans more than a factor of ten, 1, 2 and 5 times powers of ten, or powers alone.
 std::vector<double> ticks(const DepthAxis& axis, int most);

@@ -35,9 +35,7 @@ void Session::setCursor(std::optional<QPoint> pixel) {
 }
 
 void Session::setPin(std::optional<QPoint> pixel) {
-  const std::optional<QPoint> before = this->pixel();
-  pin_ = pixel;
-  if (before != this->pixel()) emit pixelChanged();
+  if (assign(pin_, pixel)) emit pixelChanged();
 }
 
 void Session::setBox(std::optional<Box> box) {

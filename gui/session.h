@@ -42,7 +42,7 @@ class Session : public QObject {
   // Only on a change.
   void picturesChanged();
   void viewChanged();
-  void pixelChanged();
+  void pixelChanged();  // or whether it is pinned
   void boxChanged();
   void said(const QString& line);
 

@@ -38,6 +38,18 @@ TEST(DepthAxis, HasRoomAround) {
   EXPECT_EQ(axisAround(1, -1, true), DepthAxis{});
 }
 
+TEST(DepthAxis, ZoomsAroundAPlace) {
+  for (const DepthAxis& whole : {DepthAxis{-3, 5}, DepthAxis{0.1, 1000, true}}) {
+    const DepthAxis closer = zoomed(whole, whole, 0.25, 0.5);
+    EXPECT_NEAR(closer.place(whole.depth(0.25)), 0.25, 1e-12);
+    EXPECT_NEAR(closer.place(whole.depth(0.5)), 0.75, 1e-12);
+    EXPECT_EQ(zoomed(closer, whole, 0.25, 100), whole);
+    DepthAxis closest = whole;
+    for (int i = 0; i < 1000; ++i) closest = zoomed(closest, whole, 0.7, 0.5);
+    EXPECT_LT(float(closest.near), float(closest.far));
+  }
+}
+
 TEST(DepthAxis, TicksAreRoundAndFew) {
   EXPECT_THAT(ticks({0, 1}, 6), Pointwise(DoubleEq(), {0.0, 0.2, 0.4, 0.6, 0.8, 1.0}));
   EXPECT_THAT(ticks({5.2, 19.3}, 4), Pointwise(DoubleEq(), {10.0, 15.0}));

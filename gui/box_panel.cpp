@@ -1,0 +1,177 @@
+#include "gui/box_panel.h"
+
+#include <QHeaderView>
+#include <QPainter>
+#include <QStyledItemDelegate>
+#include <QVBoxLayout>
+#include <algorithm>
+
+#include "gui/pixel_samples.h"
+
+namespace fathom::gui {
+
+namespace {
+
+constexpr int kPartRole = Qt::UserRole;  // the length of a cell's bar, of 1
+
+// A bar behind the number.
+class BarDelegate : public QStyledItemDelegate {
+ public:
+  using QStyledItemDelegate::QStyledItemDelegate;
+
+  void paint(QPainter* painter, const QStyleOptionViewItem& option, const QModelIndex& index) const override {
+    const double part = std::clamp(index.data(kPartRole).toDouble(), 0.0, 1.0);
+    QRectF bar = QRectF(option.rect).adjusted(2, 2, -2, -2);
+    bar.setWidth(bar.width() * part);
+    QColor colour = option.palette.color(QPalette::Highlight);
+    colour.setAlpha(110);
+    painter->fillRect(bar, colour);
+    QStyledItemDelegate::paint(painter, option, index);
+  }
+};
+
+QTableWidget* makeTable(const QStringList& columns, QWidget* parent) {
+  auto* table = new QTableWidget(0, int(columns.size()), parent);
+  table->setHorizontalHeaderLabels(columns);
+  table->horizontalHeader()->setSectionResizeMode(QHeaderView::Stretch);
+  table->verticalHeader()->hide();
+  table->verticalHeader()->setDefaultSectionSize(table->fontMetrics().height() + 4);
+  table->setEditTriggers(QAbstractItemView::NoEditTriggers);
+  table->setSelectionMode(QAbstractItemView::NoSelection);
+  table->setFocusPolicy(Qt::NoFocus);
+  table->setShowGrid(false);
+  table->setItemDelegate(new BarDelegate(table));
+  return table;
+}
+
+void setCell(QTableWidget* table, int row, int column, const QString& text, double part = 0) {
+  auto* item = new QTableWidgetItem(text);
+  item->setData(kPartRole, part);
+  item->setTextAlignment(Qt::AlignRight | Qt::AlignVCenter);
+  table->setItem(row, column, item);
+}
+
+QString number(double value) {
+  return QString::number(value, 'g', 5);
+}
+
+QString percent(double part) {
+  return QString("%1 %").arg(100 * part, 0, 'f', 1);
+}
+
+std::array<std::string, 3> three(const std::vector<std::string>& channels) {
+  if (channels.size() != 3) return {"R", "G", "B"};  // whose absence is then said
+  return {channels[0], channels[1], channels[2]};
+}
+
+}  // namespace
+
+BoxPanel::BoxPanel(Session& session, QWidget* parent)
+    : QWidget(parent),
+      session_(session),
+      summary_(new QLabel(this)),
+      counts_(makeTable({tr("bins in a pixel"), tr("pixels"), tr("part")}, this)),
+      bins_(makeTable({tr("bin"), tr("pixels"), tr("depth"), tr("seen"), tr("energy"), tr("part")}, this)) {
+  summary_->setWordWrap(true);
+  summary_->setTextFormat(Qt::RichText);
+  summary_->setTextInteractionFlags(Qt::TextSelectableByMouse);
+  auto* layout = new QVBoxLayout(this);
+  layout->addWidget(summary_);
+  layout->addWidget(counts_, 2);
+  layout->addWidget(bins_, 3);
+  connect(&session_, &Session::boxChanged, this, &BoxPanel::follow);
+  connect(&session_, &Session::viewChanged, this, &BoxPanel::follow);
+  connect(&session_, &Session::picturesChanged, this, &BoxPanel::follow);
+  connect(&job_, &NewestJob::failed, this, &BoxPanel::say);
+  follow();
+}
+
+void BoxPanel::showEvent(QShowEvent*) {
+  follow();
+}
+
+void BoxPanel::follow() {
+  const PicturePtr& picture = session_.a();
+  if (!picture || !session_.box()) {
+    box_.reset();
+    return say(tr("Drag a box in the picture with the shift key held: what its pixels have in common stands here."));
+  }
+  if (!picture->deep()) return say(tr("A flat picture has no bins."));
+  const std::string& layer = session_.view().layer;
+  if (!isVisible() || (asked_ == picture && box_ == session_.box() && layer_ == layer)) return;
+  if (asked_ != picture) job_.forget();
+  asked_ = picture;
+  box_ = session_.box();
+  layer_ = layer;
+  const float stops = session_.view().display.exposure;
+  job_.request([this, picture, box = *box_, layer, stops] {
+    const deep::BoxStatistics found =
+        deep::boxStatistics(*picture->deep(), box, three(colourChannels(*picture, layer)));
+    return [this, found, stops] { show(found, stops); };
+  });
+}
+
+void BoxPanel::say(const QString& text) {
+  job_.forget();
+  asked_.reset();
+  summary_->setText(text.toHtmlEscaped());
+  counts_->setVisible(false);
+  bins_->setVisible(false);
+}
+
+void BoxPanel::show(const deep::BoxStatistics& statistics, float stops) {
+  const deep::Statistics& counts = statistics.counts;
+  const Box& box = statistics.box;
+  if (counts.pixels == 0) return say(tr("The box lies outside of the picture."));
+  const auto& colour = statistics.colour;
+  const QString swatch = displayColour(colour[0], colour[1], colour[2], stops).name();
+  QString text = tr("<b>%1 x %2</b> pixels at %3 %4<br>").arg(box.width()).arg(box.height()).arg(box.x0).arg(box.y0);
+  text += tr("<b>%1</b> bins, %2 a pixel, %3 at most, at %4 %5<br>")
+              .arg(counts.samples)
+              .arg(double(counts.samples) / double(counts.pixels), 0, 'f', 2)
+              .arg(counts.mostSamples)
+              .arg(counts.mostX)
+              .arg(counts.mostY);
+  if (counts.nearest <= counts.farthest)
+    text += tr("depth <b>%1</b> to <b>%2</b><br>").arg(number(double(counts.nearest)), number(double(counts.farthest)));
+  text += tr("mean <span style='color:%1'>&#9632;</span> %2 %3 %4, alpha %5")
+              .arg(swatch, number(colour[0]), number(colour[1]), number(colour[2]), number(statistics.alpha));
+  summary_->setText(text);
+  showCounts(counts);
+  showBins(statistics);
+  emit ready();
+}
+
+void BoxPanel::showCounts(const deep::Statistics& counts) {
+  counts_->setRowCount(0);
+  for (size_t bucket = 0; bucket < counts.histogram.size(); ++bucket) {
+    if (counts.histogram[bucket] == 0) continue;
+    const int row = counts_->rowCount();
+    counts_->insertRow(row);
+    const double part = double(counts.histogram[bucket]) / double(counts.pixels);
+    setCell(counts_, row, 0, QString::fromStdString(deep::Statistics::bucketName(bucket)));
+    setCell(counts_, row, 1, QString::number(counts.histogram[bucket]));
+    setCell(counts_, row, 2, percent(part), part);
+  }
+  counts_->setVisible(true);
+}
+
+void BoxPanel::showBins(const deep::BoxStatistics& statistics) {
+  double energy = 0;
+  for (const deep::BinStatistics& bin : statistics.bins) energy += bin.energy;
+  bins_->setRowCount(int(statistics.bins.size()));
+  for (int row = 0; row < bins_->rowCount(); ++row) {
+    const deep::BinStatistics& bin = statistics.bins[size_t(row)];
+    const double pixels = double(bin.pixels) / double(statistics.counts.pixels);
+    const double part = energy > 0 ? bin.energy / energy : 0;
+    setCell(bins_, row, 0, QString::number(row));
+    setCell(bins_, row, 1, percent(pixels), pixels);
+    setCell(bins_, row, 2, number(bin.depth));
+    setCell(bins_, row, 3, number(bin.alpha), bin.alpha);
+    setCell(bins_, row, 4, number(bin.energy));
+    setCell(bins_, row, 5, percent(part), part);
+  }
+  bins_->setVisible(true);
+}
+
+}  // namespace fathom::gui

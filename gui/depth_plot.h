@@ -1,0 +1,58 @@
+// One pixel over depth: its samples as bars in their colours, outlined up to alpha and filled up to what is seen of them;
+// the transmittance falling from front to back; what is clipped away dimmed. The wheel
+// looks closer, a double click shows all.
+#pragma once
+
+#include <QWidget>
+
+#include "deep/clip_view.h"
+#include "deep/depth_axis.h"
+#include "gui/pixel_samples.h"
+
+namespace fathom::gui {
+
+class DepthPlot : public QWidget {
+  Q_OBJECT
+
+ public:
+  explicit DepthPlot(QWidget* parent = nullptr);
+
+  void show(const PixelSamples& samples);
+  void setClip(const deep::DepthRange& clip);
+  void setLogarithmic(bool logarithmic);
+  void setHighlight(int sample);  // -1: none
+
+  const deep::DepthAxis& axis() const { return axis_; }
+  // Where things are drawn: the frame around the bars, and a bar up to `height` of 1.
+  QRectF frame() const;
+  QRectF bar(int sample, double height) const;
+  QSize sizeHint() const override;
+
+ signals:
+  void hovered(int sample);  // -1: none
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseDoubleClickEvent(QMouseEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+  void leaveEvent(QEvent* event) override;
+
+ private:
+  void fitAxis();
+  double xOf(double depth) const;
+  double yOf(double value) const;
+  int sampleAt(const QPointF& at) const;
+  void paintAxes(QPainter& painter) const;
+  void paintBars(QPainter& painter) const;
+  void paintTransmittance(QPainter& painter) const;
+  void paintCaption(QPainter& painter) const;
+
+  PixelSamples samples_;
+  deep::DepthRange clip_;
+  deep::DepthAxis whole_, axis_;  // around all samples, and what is shown of it
+  bool logarithmic_ = false;
+  int highlight_ = -1;
+};
+
+}  // namespace fathom::gui
