@@ -82,7 +82,7 @@ BoxPanel::BoxPanel(Session& session, QWidget* parent)
   connect(&session_, &Session::boxChanged, this, &BoxPanel::follow);
   connect(&session_, &Session::viewChanged, this, &BoxPanel::follow);
   connect(&session_, &Session::picturesChanged, this, &BoxPanel::follow);
-  connect(&job_, &NewestJob::failed, this, &BoxPanel::say);
+  connect(&job_, &Background::failed, this, &BoxPanel::say);
   follow();
 }
 
@@ -99,12 +99,12 @@ void BoxPanel::follow() {
   if (!picture->deep()) return say(tr("A flat picture has no bins."));
   const std::string& layer = session_.view().layer;
   if (!isVisible() || (asked_ == picture && box_ == session_.box() && layer_ == layer)) return;
-  if (asked_ != picture) job_.forget();
+  if (asked_ != picture) job_.clear();
   asked_ = picture;
   box_ = session_.box();
   layer_ = layer;
   const float stops = session_.view().display.exposure;
-  job_.request([this, picture, box = *box_, layer, stops] {
+  job_.run([this, picture, box = *box_, layer, stops](const Progress&) {
     const deep::BoxStatistics found =
         deep::boxStatistics(*picture->deep(), box, three(colourChannels(*picture, layer)));
     return [this, found, stops] { show(found, stops); };
@@ -112,7 +112,7 @@ void BoxPanel::follow() {
 }
 
 void BoxPanel::say(const QString& text) {
-  job_.forget();
+  job_.clear();
   asked_.reset();
   summary_->setText(text.toHtmlEscaped());
   counts_->setVisible(false);

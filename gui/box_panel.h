@@ -5,7 +5,7 @@
 #include <QTableWidget>
 
 #include "deep/box_statistics.h"
-#include "gui/newest_job.h"
+#include "gui/background.h"
 #include "gui/session.h"
 
 namespace fathom::gui {
@@ -35,7 +35,7 @@ class BoxPanel : public QWidget {
   std::string layer_;
   QLabel* summary_;
   QTableWidget *counts_, *bins_;
-  NewestJob job_;
+  Background job_;
 };
 
 }  // namespace fathom::gui

@@ -51,7 +51,7 @@ DepthSlice::DepthSlice(Session& session, QWidget* parent) : QWidget(parent), ses
   setMinimumHeight(120);
   setMouseTracking(true);
   connect(&session_, &Session::picturesChanged, this, [this] {
-    job_.forget();
+    job_.clear();
     row_.reset();
     requested_.reset();
     shown_.reset();
@@ -59,7 +59,7 @@ DepthSlice::DepthSlice(Session& session, QWidget* parent) : QWidget(parent), ses
     follow();
   });
   connect(&session_, &Session::viewChanged, this, &DepthSlice::follow);
-  connect(&job_, &NewestJob::failed, &session_, &Session::say);
+  connect(&job_, &Background::failed, &session_, &Session::say);
 }
 
 QSize DepthSlice::sizeHint() const {
@@ -110,7 +110,7 @@ void DepthSlice::follow() {
   x0_ = request->x0;
   x1_ = request->x1;
   window_ = request->picture->dataWindow();
-  job_.request([this, request = *request] {
+  job_.run([this, request = *request](const Progress&) {
     auto made = std::make_shared<Answer>(answer(request));
     return [this, made] {
       shown_ = std::move(*made);

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "deep/depth_slice.h"
-#include "gui/newest_job.h"
+#include "gui/background.h"
 #include "gui/session.h"
 
 namespace fathom::gui {
@@ -77,7 +77,7 @@ class DepthSlice : public QWidget {
   Box window_;           // that they were chosen for
   std::optional<deep::DepthAxis> axis_;
   std::optional<QPointF> mouse_;
-  NewestJob job_;
+  Background job_;
 };
 
 }  // namespace fathom::gui
