@@ -1,6 +1,7 @@
 #include "gui/main_window.h"
 
 #include <QCloseEvent>
+#include <QDockWidget>
 #include <QDragEnterEvent>
 #include <QDropEvent>
 #include <QFileDialog>
@@ -11,6 +12,7 @@
 #include <QStatusBar>
 #include <array>
 
+#include "gui/inspector_panel.h"
 #include "gui/jobs_bar.h"
 #include "gui/key_sheet.h"
 #include "gui/playback_bar.h"
@@ -97,6 +99,10 @@ void MainWindow::addPanels() {
   addToolBar(Qt::TopToolBarArea, viewBar_);
   addToolBar(Qt::BottomToolBarArea, new PlaybackBar(frames_));
   statusBar()->addPermanentWidget(new JobsBar(jobs_));
+  auto* inspector = new QDockWidget("Inspector", this);
+  inspector->setObjectName("inspector");
+  inspector->setWidget(inspector_ = new InspectorPanel(session_, inspector));
+  addDockWidget(Qt::RightDockWidgetArea, inspector);
 }
 
 void MainWindow::addMenus() {
@@ -132,6 +138,9 @@ void MainWindow::addViewMenu() {
   menu->addSeparator();
   addTo(menu, "Half a Stop Brighter", {QKeySequence("]")}, this, [this] { viewBar_->changeExposure(0.5); });
   addTo(menu, "Half a Stop Darker", {QKeySequence("[")}, this, [this] { viewBar_->changeExposure(-0.5); });
+  menu->addSeparator();
+  inspector_->unpinAction()->setShortcut(QKeySequence("Escape"));
+  menu->addAction(inspector_->unpinAction());
 }
 
 void MainWindow::addDepthMenu() {
@@ -146,6 +155,7 @@ void MainWindow::addDepthMenu() {
     view.clip = {};
     session_.setView(view);
   });
+  menu->addAction(inspector_->logarithmicAction());
 }
 
 void MainWindow::addCompareMenu() {

@@ -11,6 +11,7 @@
 
 namespace fathom::gui {
 
+class InspectorPanel;
 class RecentFiles;
 class ViewBar;
 
@@ -51,6 +52,7 @@ class MainWindow : public QMainWindow {
   Frames frames_{session_};
   Jobs jobs_;
   ViewBar* viewBar_;
+  InspectorPanel* inspector_;
   RecentFiles* recent_;
 };
 
