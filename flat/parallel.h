@@ -5,7 +5,11 @@
 // ThreadSanitizer cannot see how tasks are handed over inside Debian's libtbb and takes every result for a race.
 #include "flat/parallel_threads.h"
 #else
+// The viewer's sources have a macro of Qt by the name of one of oneTBB's functions.
+#pragma push_macro("emit")
+#undef emit
 #include <tbb/parallel_for.h>
+#pragma pop_macro("emit")
 #endif
 
 namespace fathom {
