@@ -1,0 +1,131 @@
+#include "gui/seen.h"
+
+#include <algorithm>
+#include <span>
+
+#include "deep/sample_view.h"
+#include "flat/error.h"
+#include "flat/parallel.h"
+
+namespace fathom::gui {
+
+namespace {
+
+using Kind = Layer::Kind;
+
+constexpr int kBandRows = 32;
+
+// The channel that says how far the layer covers its pixels; empty: none.
+std::string alphaOf(const Picture& picture, const Layer& layer) {
+  if (layer.channels.size() == 4) return layer.channels[3];
+  const bool there = picture.deep() ? picture.deep()->find("A") != nullptr : picture.flat()->find("A") != nullptr;
+  return there ? "A" : "";
+}
+
+std::vector<std::string> shownChannels(const Layer& layer) {
+  std::vector<std::string> result = layer.channels;
+  if (result.size() > 3) result.resize(3);
+  return result;
+}
+
+// What the planes of some rows are filled from, and where they begin.
+struct Band {
+  Box box;
+  size_t first;
+};
+
+void compositeBand(const deep::DeepImage& image, const deep::DepthRange& clip, const std::vector<std::string>& channels,
+                   const std::string& alpha, const Band& band, Seen& seen) {
+  std::vector<std::string> all = channels;
+  if (alpha != "A" && !alpha.empty()) all.push_back(alpha);
+  std::erase(all, "A");
+  const flat::Image made = deep::clipView(image, band.box, seen.step, clip, all);
+  for (size_t c = 0; c < channels.size(); ++c)
+    std::ranges::copy(made.get(channels[c]).values, seen.values[c].data() + band.first);
+  if (!alpha.empty()) std::ranges::copy(made.get(alpha).values, seen.alpha.data() + band.first);
+}
+
+void countBand(const deep::DeepImage& image, const deep::DepthRange& clip, const Band& band, Seen& seen) {
+  std::ranges::transform(deep::countSamples(image, band.box, seen.step, clip), seen.values[0].data() + band.first,
+                         [](uint32_t count) { return float(count); });
+}
+
+void identifyBand(const deep::DeepImage& image, const deep::DepthRange& clip, const std::string& channel,
+                  const Band& band, Seen& seen) {
+  const Buffer<uint64_t> chosen = deep::mostSeen(image, band.box, seen.step, clip);
+  const Buffer<uint32_t>& ids = image.find(channel)->ids;
+  for (size_t i = 0; i < chosen.size(); ++i)
+    if (chosen[i] != deep::kNoSample) seen.ids[band.first + i] = ids[chosen[i]];
+}
+
+void takePlane(const flat::Image& image, const std::string& channel, const Band& band, const Seen& seen,
+               Buffer<float>& to) {
+  const std::span<const float> from = image.get(channel).values;
+  const int rows = (band.box.height() + seen.step - 1) / seen.step;
+  parallelFor(0, rows, [&](int row) {
+    const int y = band.box.y0 + row * seen.step;
+    for (int column = 0; column < seen.width; ++column)
+      if (const int x = band.box.x0 + column * seen.step; image.dataWindow.contains(x, y))
+        to[band.first + size_t(row) * size_t(seen.width) + size_t(column)] = from[image.dataWindow.index(x, y)];
+  });
+}
+
+void takeBand(const flat::Image& image, const std::vector<std::string>& channels, const std::string& alpha,
+              const Band& band, Seen& seen) {
+  for (size_t c = 0; c < channels.size(); ++c) takePlane(image, channels[c], band, seen, seen.values[c]);
+  if (!alpha.empty()) takePlane(image, alpha, band, seen, seen.alpha);
+}
+
+}  // namespace
+
+ptrdiff_t Seen::index(QPoint pixel) const {
+  if (!box.contains(pixel.x(), pixel.y())) return -1;
+  return ptrdiff_t((pixel.y() - box.y0) / step) * width + (pixel.x() - box.x0) / step;
+}
+
+Seen see(const Picture& picture, const std::string& layerName, const deep::DepthRange& clip, const Box& box, int step,
+         const Progress& progress) {
+  const Layer* layer = picture.layer(layerName);
+  if (!layer) fail("{}: no channel to show", picture.path);
+  Seen seen{*layer, box, step, (box.width() + step - 1) / step, (box.height() + step - 1) / step};
+  const std::vector<std::string> channels = shownChannels(*layer);
+  const std::string alpha = alphaOf(picture, *layer);
+  const size_t planes = layer->kind == Kind::Count ? 1 : channels.size();
+  if (layer->kind == Kind::Identifier)
+    seen.ids = Buffer<uint32_t>(seen.pixels(), 0);
+  else
+    for (size_t c = 0; c < planes; ++c) seen.values.emplace_back(seen.pixels(), 0.0f);
+  const bool composited = layer->kind != Kind::Count && layer->kind != Kind::Identifier;
+  if (!alpha.empty() && composited) seen.alpha = Buffer<float>(seen.pixels(), 0.0f);
+
+  for (int row = 0; row < seen.height; row += kBandRows) {
+    progress.at(double(row) / seen.height);
+    const Box rows{box.x0, box.y0 + row * step, box.x1, std::min(box.y1, box.y0 + (row + kBandRows) * step)};
+    const Band band{rows, size_t(row) * size_t(seen.width)};
+    if (!picture.deep())
+      takeBand(*picture.flat(), channels, alpha, band, seen);
+    else if (layer->kind == Kind::Count)
+      countBand(*picture.deep(), clip, band, seen);
+    else if (layer->kind == Kind::Identifier)
+      identifyBand(*picture.deep(), clip, channels[0], band, seen);
+    else
+      compositeBand(*picture.deep(), clip, channels, alpha, band, seen);
+  }
+  return seen;
+}
+
+std::vector<NamedValue> namedValues(const Seen& seen, size_t index, int digits) {
+  std::vector<NamedValue> result;
+  const auto name = [&](size_t c) {
+    const std::string& channel = seen.layer.channels[c];
+    return QString::fromStdString(seen.layer.channels.size() > 1 ? channel.substr(channel.rfind('.') + 1) : channel);
+  };
+  if (!seen.ids.empty()) return {{name(0), QString::number(seen.ids[index])}};
+  if (seen.layer.kind == Kind::Count) return {{"samples", QString::number(int64_t(seen.values[0][index]))}};
+  for (size_t c = 0; c < seen.values.size(); ++c)
+    result.push_back({name(c), QString::number(double(seen.values[c][index]), 'g', digits)});
+  if (!seen.alpha.empty()) result.push_back({"A", QString::number(double(seen.alpha[index]), 'g', digits)});
+  return result;
+}
+
+}  // namespace fathom::gui
