@@ -10,8 +10,10 @@
 #include <QMimeData>
 #include <QSettings>
 #include <QStatusBar>
+#include <QVBoxLayout>
 #include <array>
 
+#include "gui/info_bar.h"
 #include "gui/inspector_panel.h"
 #include "gui/jobs_bar.h"
 #include "gui/key_sheet.h"
@@ -55,9 +57,10 @@ QString describe(const Picture& picture) {
 MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent) {
   setAcceptDrops(true);
   resize(1440, 900);
+  connect(&session_, &Session::said, this, [this](const QString& line) { statusBar()->showMessage(line); });
+  addCanvas();
   addPanels();
   addMenus();
-  connect(&session_, &Session::said, this, [this](const QString& line) { statusBar()->showMessage(line); });
   connect(&session_, &Session::picturesChanged, this, &MainWindow::follow);
   connect(&jobs_, &Jobs::failed, &session_, [this](const QString&, const QString& line) { session_.say(line); });
   follow();
@@ -92,6 +95,21 @@ void MainWindow::closeEvent(QCloseEvent* event) {
   settings.setValue("geometry", saveGeometry());
   settings.setValue("state", saveState());
   QMainWindow::closeEvent(event);
+}
+
+void MainWindow::addCanvas() {
+  std::string problem;
+  canvas_ = new Canvas(session_, Display::open(problem));
+  if (!problem.empty()) session_.say(QString::fromStdString(problem));
+  auto* info = new InfoBar(session_);
+  connect(canvas_, &Canvas::zoomChanged, info, &InfoBar::setZoom);
+  auto* centre = new QWidget;
+  auto* column = new QVBoxLayout(centre);
+  column->setContentsMargins(0, 0, 0, 0);
+  column->setSpacing(0);
+  column->addWidget(canvas_, 1);
+  column->addWidget(info);
+  setCentralWidget(centre);
 }
 
 void MainWindow::addPanels() {

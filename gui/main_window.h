@@ -5,6 +5,7 @@
 #include <QMainWindow>
 #include <functional>
 
+#include "gui/canvas.h"
 #include "gui/frames.h"
 #include "gui/jobs.h"
 #include "gui/session.h"
@@ -24,6 +25,7 @@ class MainWindow : public QMainWindow {
   Session& session() { return session_; }
   Frames& frames() { return frames_; }
   Jobs& jobs() { return jobs_; }
+  Canvas& canvas() { return *canvas_; }
 
   // Places of the panels as they were when the last window was closed.
   void restore();
@@ -35,6 +37,7 @@ class MainWindow : public QMainWindow {
   void closeEvent(QCloseEvent* event) override;
 
  private:
+  void addCanvas();
   void addPanels();
   void addMenus();
   void addFileMenu();
@@ -51,6 +54,7 @@ class MainWindow : public QMainWindow {
   Session session_;
   Frames frames_{session_};
   Jobs jobs_;
+  Canvas* canvas_;
   ViewBar* viewBar_;
   InspectorPanel* inspector_;
   RecentFiles* recent_;
