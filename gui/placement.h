@@ -1,0 +1,68 @@
+// A volume, or any deep image, that is placed in A: moved and scaled while one looks.
+#pragma once
+
+#include <QObject>
+#include <QString>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "deep/ops/transform.h"
+#include "gui/background.h"
+#include "gui/frames.h"
+
+namespace fathom::gui {
+
+// Between which depths the samples of A and of the volume lie as they were read; finite ones.
+struct PlacedDepths {
+  float nearest = 0, farthest = 0;              // of A
+  float volumeNearest = 0, volumeFarthest = 0;  // of the volume
+  bool operator==(const PlacedDepths&) const = default;
+};
+
+class Placement : public QObject {
+  Q_OBJECT
+
+ public:
+  Placement(Session& session, Frames& frames, QObject* parent = nullptr);
+  ~Placement() override;
+
+  bool active() const { return volume_.has_value(); }
+  // The file that is placed in the current frame; empty: none. Of a sequence, the one of A's frame or the nearest.
+  std::string file() const;
+  const deep::Transform& transform() const { return transform_; }
+  const PlacedDepths& depths() const { return depths_; }
+  bool busy() const { return background_.busy(); }
+
+ public slots:
+  // A file or a pattern; takes the place of the one before. From now on A is shown with it.
+  void open(const QString& path);
+  // Shows A as it is again.
+  void remove();
+  void setTransform(const fathom::deep::Transform& transform);
+
+ signals:
+  // Another volume, or none, or it was moved.
+  void changed();
+  // Another range of depths is known.
+  void depthsChanged();
+
+ private:
+  // What was read last, kept for the next move.
+  struct Read {
+    std::string path;
+    PicturePtr picture;
+  };
+  void place();
+
+  Session& session_;
+  Frames& frames_;
+  std::optional<Source> volume_;
+  deep::Transform transform_;
+  PlacedDepths depths_;
+  PicturePtr original_;         // A as it was read
+  std::shared_ptr<Read> read_;  // touched by the work in the background only
+  Background background_;
+};
+
+}  // namespace fathom::gui
