@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   fathom::gui::MainWindow window;
   window.restore();
   window.frames().cache().setLimit(memory);
+  window.frameJobs().setMemory(memory);
   if (!files.empty()) window.frames().open(QString::fromStdString(files[0]));
   if (files.size() > 1) window.frames().openB(QString::fromStdString(files[1]));
   window.show();

@@ -13,10 +13,12 @@
 #include <QVBoxLayout>
 #include <array>
 
+#include "gui/compare_panel.h"
 #include "gui/info_bar.h"
 #include "gui/inspector_panel.h"
 #include "gui/jobs_bar.h"
 #include "gui/key_sheet.h"
+#include "gui/place_panel.h"
 #include "gui/playback_bar.h"
 #include "gui/recent_files.h"
 #include "gui/view_bar.h"
@@ -62,7 +64,6 @@ MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent) {
   addPanels();
   addMenus();
   connect(&session_, &Session::picturesChanged, this, &MainWindow::follow);
-  connect(&jobs_, &Jobs::failed, &session_, [this](const QString&, const QString& line) { session_.say(line); });
   follow();
 }
 
@@ -121,6 +122,16 @@ void MainWindow::addPanels() {
   inspector->setObjectName("inspector");
   inspector->setWidget(inspector_ = new InspectorPanel(session_, inspector));
   addDockWidget(Qt::RightDockWidgetArea, inspector);
+  const auto addBeside = [&](const QString& title, const char* name, QWidget* panel) {
+    auto* dock = new QDockWidget(title, this);
+    dock->setObjectName(name);
+    dock->setWidget(panel);
+    addDockWidget(Qt::RightDockWidgetArea, dock);
+    tabifyDockWidget(inspector, dock);
+  };
+  addBeside("Compare", "compare", new ComparePanel(session_, frames_));
+  addBeside("Place", "place", new PlacePanel(session_, placement_));
+  inspector->raise();
 }
 
 void MainWindow::addMenus() {

@@ -6,8 +6,10 @@
 #include <functional>
 
 #include "gui/canvas.h"
+#include "gui/frame_jobs.h"
 #include "gui/frames.h"
 #include "gui/jobs.h"
+#include "gui/placement.h"
 #include "gui/session.h"
 
 namespace fathom::gui {
@@ -26,6 +28,8 @@ class MainWindow : public QMainWindow {
   Frames& frames() { return frames_; }
   Jobs& jobs() { return jobs_; }
   Canvas& canvas() { return *canvas_; }
+  FrameJobs& frameJobs() { return frameJobs_; }
+  Placement& placement() { return placement_; }
 
   // Places of the panels as they were when the last window was closed.
   void restore();
@@ -54,6 +58,8 @@ class MainWindow : public QMainWindow {
   Session session_;
   Frames frames_{session_};
   Jobs jobs_;
+  FrameJobs frameJobs_{session_, frames_, jobs_};
+  Placement placement_{session_, frames_};
   Canvas* canvas_;
   ViewBar* viewBar_;
   InspectorPanel* inspector_;
