@@ -14,6 +14,7 @@
 #include <array>
 
 #include "gui/compare_panel.h"
+#include "gui/depth_panel.h"
 #include "gui/info_bar.h"
 #include "gui/inspector_panel.h"
 #include "gui/jobs_bar.h"
@@ -132,6 +133,10 @@ void MainWindow::addPanels() {
   addBeside("Compare", "compare", new ComparePanel(session_, frames_));
   addBeside("Place", "place", new PlacePanel(session_, placement_));
   inspector->raise();
+  auto* depth = new QDockWidget("Depth", this);
+  depth->setObjectName("depth");
+  depth->setWidget(depth_ = new DepthPanel(session_));
+  addDockWidget(Qt::BottomDockWidgetArea, depth);
 }
 
 void MainWindow::addMenus() {
@@ -184,6 +189,8 @@ void MainWindow::addDepthMenu() {
     view.clip = {};
     session_.setView(view);
   });
+  depth_->animateAction()->setShortcut(QKeySequence("Z"));
+  menu->addAction(depth_->animateAction());
   menu->addAction(inspector_->logarithmicAction());
 }
 

@@ -14,6 +14,7 @@
 
 namespace fathom::gui {
 
+class DepthPanel;
 class InspectorPanel;
 class RecentFiles;
 class ViewBar;
@@ -62,6 +63,7 @@ class MainWindow : public QMainWindow {
   Placement placement_{session_, frames_};
   Canvas* canvas_;
   ViewBar* viewBar_;
+  DepthPanel* depth_;
   InspectorPanel* inspector_;
   RecentFiles* recent_;
 };
