@@ -101,8 +101,11 @@ void MainWindow::closeEvent(QCloseEvent* event) {
 
 void MainWindow::addCanvas() {
   std::string problem;
-  canvas_ = new Canvas(session_, Display::open(problem));
+  const std::shared_ptr<const Display> display = Display::open(problem);
+  canvas_ = new Canvas(session_, display);
   if (!problem.empty()) session_.say(QString::fromStdString(problem));
+  viewBar_ = new ViewBar(session_, display);
+  addToolBar(Qt::TopToolBarArea, viewBar_);
   auto* info = new InfoBar(session_);
   connect(canvas_, &Canvas::zoomChanged, info, &InfoBar::setZoom);
   auto* centre = new QWidget;
@@ -115,8 +118,6 @@ void MainWindow::addCanvas() {
 }
 
 void MainWindow::addPanels() {
-  viewBar_ = new ViewBar(session_);
-  addToolBar(Qt::TopToolBarArea, viewBar_);
   addToolBar(Qt::BottomToolBarArea, new PlaybackBar(frames_));
   statusBar()->addPermanentWidget(new JobsBar(jobs_));
   auto* inspector = new QDockWidget("Inspector", this);

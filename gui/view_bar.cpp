@@ -22,6 +22,12 @@ constexpr std::array kIsolateChoices = {
     IsolateChoice{Isolate::Alpha, "A", "Alpha", "A"},        IsolateChoice{Isolate::Luminance, "L", "Luminance", "L"},
 };
 
+bool hasFalseColours(const PicturePtr& picture, const ViewState& view) {
+  const Layer* layer = picture ? picture->layer(view.layer) : nullptr;
+  return layer && layer->kind != Layer::Kind::Colour && layer->kind != Layer::Kind::Vector &&
+         layer->kind != Layer::Kind::Identifier;
+}
+
 QStringList namesOf(const std::vector<Layer>& layers) {
   QStringList names;
   for (const Layer& layer : layers) names << QString::fromStdString(layer.name);
@@ -30,7 +36,8 @@ QStringList namesOf(const std::vector<Layer>& layers) {
 
 }  // namespace
 
-ViewBar::ViewBar(Session& session, QWidget* parent) : QToolBar("View", parent), session_(session) {
+ViewBar::ViewBar(Session& session, std::shared_ptr<const Display> display, QWidget* parent)
+    : QToolBar("View", parent), session_(session), display_(std::move(display)) {
   setObjectName("view bar");
   setMovable(false);
   layers_ = new QComboBox;
@@ -45,6 +52,20 @@ ViewBar::ViewBar(Session& session, QWidget* parent) : QToolBar("View", parent), 
   addSeparator();
   addNumber("Exposure", "Exposure in stops, before the display transform", -20, 20, &DisplayParams::exposure);
   addNumber("Gamma", "Gamma, after the display transform", 0.1, 5, &DisplayParams::gamma);
+  const QList<QAction*> low = addNumber("From", "Where the false colours begin; as high as To: where the values do",
+                                        -1e9, 1e9, &DisplayParams::low);
+  const QList<QAction*> high = addNumber("To", "Where the false colours end", -1e9, 1e9, &DisplayParams::high);
+  followers_.append([this, ends = low + high](const ViewState& view) {
+    for (QAction* action : ends) action->setVisible(hasFalseColours(session_.a(), view));
+  });
+  addChoice("Display", &DisplayParams::display, [this] { return display_->displays(); });
+  addChoice("View of that display", &DisplayParams::view,
+            [this] { return display_->views(session_.view().display.display); });
+  addChoice("Look", &DisplayParams::look, [this] {
+    std::vector<std::string> looks = display_->looks();
+    looks.insert(looks.begin(), std::string());
+    return looks;
+  });
   addMark("Clipped", "Mark values below 0 and above 1", &DisplayParams::markClipped);
   addMark("NaN", "Mark values that are no number or infinite", &DisplayParams::markNan);
   connect(&session_, &Session::picturesChanged, this, &ViewBar::listLayers);
@@ -86,8 +107,8 @@ void ViewBar::addIsolation() {
   }
 }
 
-void ViewBar::addNumber(const QString& label, const QString& tip, double low, double high,
-                        float DisplayParams::*member) {
+QList<QAction*> ViewBar::addNumber(const QString& label, const QString& tip, double low, double high,
+                                   float DisplayParams::*member) {
   auto* number = new QDoubleSpinBox;
   number->setRange(low, high);
   number->setSingleStep(0.25);
@@ -95,13 +116,35 @@ void ViewBar::addNumber(const QString& label, const QString& tip, double low, do
   number->setToolTip(tip);
   number->setKeyboardTracking(false);
   number->setFocusPolicy(Qt::ClickFocus);
-  addWidget(new QLabel(label));
-  addWidget(number);
+  const QList<QAction*> actions = {addWidget(new QLabel(label)), addWidget(number)};
   connect(number, &QDoubleSpinBox::valueChanged, this,
           [this, member](double value) { change([&](ViewState& view) { view.display.*member = float(value); }); });
   followers_.append([number, member](const ViewState& view) {
     const QSignalBlocker quiet(number);
     number->setValue(double(view.display.*member));
+  });
+  return actions;
+}
+
+void ViewBar::addChoice(const QString& tip, std::string DisplayParams::*member,
+                        const std::function<std::vector<std::string>()>& names) {
+  auto* choice = new QComboBox;
+  choice->setToolTip(tip);
+  choice->setSizeAdjustPolicy(QComboBox::AdjustToContents);
+  choice->setFocusPolicy(Qt::ClickFocus);
+  QAction* action = addWidget(choice);
+  connect(choice, &QComboBox::activated, this, [=, this](int index) {
+    change([&](ViewState& view) { view.display.*member = choice->itemData(index).toString().toStdString(); });
+  });
+  followers_.append([=](const ViewState& view) {
+    const QSignalBlocker quiet(choice);
+    choice->clear();
+    for (const std::string& name : names()) {
+      const QString text = QString::fromStdString(name);
+      choice->addItem(name.empty() ? "No look" : text, text);
+    }
+    choice->setCurrentIndex(std::max(0, choice->findData(QString::fromStdString(view.display.*member))));
+    action->setVisible(choice->count() > 1);
   });
 }
 

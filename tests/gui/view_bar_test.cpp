@@ -20,7 +20,7 @@ PicturePtr picture(const std::vector<std::string>& channels) {
 
 class ViewBarTest : public ::testing::Test {
  protected:
-  ViewBarTest() : bar_(session_) {
+  ViewBarTest() : bar_(session_, std::make_shared<Display>()) {
     session_.setA(picture({"A", "B", "G", "R", "Z", "N.X", "N.Y", "N.Z"}));
     bar_.show();
   }
@@ -30,7 +30,7 @@ class ViewBarTest : public ::testing::Test {
 };
 
 TEST_F(ViewBarTest, ListsTheLayersOfThePicture) {
-  auto* layers = bar_.findChild<QComboBox*>();
+  auto* layers = bar_.findChildren<QComboBox*>()[0];
   EXPECT_EQ(layers->count(), 4);  // RGBA, Z, N, samples per pixel
   EXPECT_EQ(layers->currentText(), "RGBA");
   session_.setA(picture({"A", "Z"}));
@@ -63,6 +63,29 @@ TEST_F(ViewBarTest, TypedExposureIsTheView) {
   EXPECT_EQ(session_.view().display.exposure, 1.5f);
   bar_.changeExposure(-0.5);
   EXPECT_EQ(exposure->value(), 1);
+}
+
+TEST_F(ViewBarTest, ADisplayBringsItsOwnViews) {
+  const Display display;
+  auto* displays = bar_.findChildren<QComboBox*>()[1];
+  auto* views = bar_.findChildren<QComboBox*>()[2];
+  ASSERT_EQ(displays->count(), int(display.displays().size()));
+  ASSERT_GT(displays->count(), 1);
+  emit displays->activated(1);
+  EXPECT_EQ(session_.view().display.display, display.displays()[1]);
+  EXPECT_EQ(views->count(), int(display.views(display.displays()[1]).size()));
+}
+
+TEST_F(ViewBarTest, TheEndsOfFalseColoursShowWithThem) {
+  auto* from = bar_.findChildren<QDoubleSpinBox*>()[2];
+  const auto shown = [&] {
+    for (QAction* action : bar_.actions())
+      if (bar_.widgetForAction(action) == from) return action->isVisible();
+    return false;
+  };
+  EXPECT_FALSE(shown());
+  bar_.nextLayer();  // Z
+  EXPECT_TRUE(shown());
 }
 
 }  // namespace
