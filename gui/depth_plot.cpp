@@ -171,7 +171,7 @@ void DepthPlot::paintBars(QPainter& painter) const {
     painter.fillRect(bar(i, sample.alpha), faint);
     painter.fillRect(bar(i, sample.seen), fillOf(sample));
     painter.setBrush(Qt::NoBrush);
-    painter.setPen(i == highlight_ ? QPen(palette().color(QPalette::Highlight), 2) : QPen(between(palette(), 0.45), 1));
+    painter.setPen(i == highlight_ ? QPen(palette().color(QPalette::Highlight), 2) : QPen(between(palette(), 0.6), 1));
     painter.drawRect(bar(i, std::max(sample.alpha, 0.01)));
   }
 }

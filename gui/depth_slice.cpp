@@ -17,6 +17,7 @@ constexpr double kLeft = 44, kTop = 22, kRight = 10, kBottom = 22;  // around th
 constexpr double kTickRows = 34, kTickColumns = 80;                 // between ticks, at least
 constexpr int kFewest = 4;                                          // columns that can be looked at
 
+constexpr double kCell = 3;   // height of a cell, and so of a surface
 constexpr double kSlabs = 8;  // whose alphas are shown, along the axis
 
 QRgb shade(double r, double g, double b, double alpha, double cells, float stops) {
@@ -79,7 +80,7 @@ std::optional<DepthSlice::Request> DepthSlice::wanted() {
   const Box& window = picture->dataWindow();
   if (pixel && pixel->y() >= window.y0 && pixel->y() < window.y1) row_ = pixel->y();
   if (!row_) return {};
-  const int cells = std::clamp(int(frame().height() * devicePixelRatioF() / 2), 16, 1024);  // a surface: two lines
+  const int cells = std::clamp(int(frame().height() / kCell), 16, 1024);
   return Request{picture,
                  colourChannels(*picture, session_.view().layer),
                  *row_,
@@ -145,7 +146,7 @@ void DepthSlice::paintEvent(QPaintEvent*) {
   paintCaption(painter);
   const QRectF area = frame();
   const double enlarged = area.width() * devicePixelRatioF() / shown_->image.width();
-  painter.setRenderHint(QPainter::SmoothPixmapTransform, enlarged < 2);
+  painter.setRenderHint(QPainter::SmoothPixmapTransform, enlarged < 1);
   painter.drawImage(area, shown_->image);
   painter.setClipRect(area.adjusted(-1, -1, 1, 1));
   paintClip(painter, area, Qt::Vertical, shown_->axis, session_.view().clip, palette(),

@@ -64,6 +64,12 @@ InspectorPanel::InspectorPanel(Session& session, QWidget* parent)
   tabs_->addTab(slice_, tr("Slice"));
   tabs_->addTab(box_, tr("Box"));
 
+  tabs_->setTabToolTip(0, tr("The plot: the wheel looks closer, a double click shows all.\n"
+                             "The table: a click on a column sorts, a right click on it chooses columns."));
+  tabs_->setTabToolTip(1, tr("The row seen from above. The wheel looks closer, with Ctrl in depth;\n"
+                             "a double click shows all, a click pins that column."));
+  tabs_->setTabToolTip(2, tr("The box that was dragged in the picture with the shift key"));
+
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(6, 4, 6, 6);
   layout->addLayout(head);

@@ -31,7 +31,9 @@ SampleTable::SampleTable(QWidget* parent)
   setShowGrid(false);
   setWordWrap(false);
   setIconSize({kSwatch, kSwatch});
-  setFont(QFontDatabase::systemFont(QFontDatabase::FixedFont));
+  QFont digits = QFontDatabase::systemFont(QFontDatabase::FixedFont);
+  digits.setPointSizeF(digits.pointSizeF() * 0.9);
+  setFont(digits);
   verticalHeader()->hide();
   verticalHeader()->setDefaultSectionSize(fontMetrics().height() + 4);
   horizontalHeader()->setContextMenuPolicy(Qt::CustomContextMenu);

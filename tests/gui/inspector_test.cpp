@@ -9,6 +9,7 @@
 #include <QSignalSpy>
 #include <QTest>
 #include <QWheelEvent>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "tests/reference/deep_samples.h"
@@ -187,10 +188,43 @@ TEST_F(Inspector, TheSliceShowsTheRow) {
   const auto at = [&](double x, double depth) { return image.pixelColor(slice->placeOf(x, depth).toPoint()); };
   EXPECT_GT(at(3.5, 2.3).green(), 200);
   EXPECT_GT(at(3.5, 2.3).green(), 2 * at(3.5, 2.3).red());
+  EXPECT_GT(at(3.5, 1).red(), 2 * at(3.5, 1).blue());
+  EXPECT_GT(at(3.5, 4).blue(), 2 * at(3.5, 4).red());
   EXPECT_EQ(at(4.5, 2.3), slice->palette().color(QPalette::Base));
   EXPECT_EQ(at(3.5, 3.3), slice->palette().color(QPalette::Base));
   QTest::mouseClick(slice, Qt::LeftButton, {}, slice->placeOf(5.5, 2).toPoint());
   EXPECT_EQ(session.pin(), QPoint(5, -2));
+}
+
+TEST_F(Inspector, TheWheelLooksCloserAtTheSlice) {
+  QSignalSpy ready(slice, &DepthSlice::ready);
+  panel.showTab(InspectorPanel::Tab::Slice);
+  ASSERT_TRUE(!ready.empty() || ready.wait());
+  const QPointF at = slice->placeOf(3.5, 2.5), other = slice->placeOf(3.5, 3);
+  QWheelEvent wheel(at, slice->mapToGlobal(at), {}, {0, 120}, {}, Qt::ControlModifier, Qt::NoScrollPhase, false);
+  for (int i = 1; i <= 2; ++i) {
+    QApplication::sendEvent(slice, &wheel);
+    ASSERT_TRUE(ready.wait());
+    EXPECT_NEAR(slice->placeOf(3.5, 2.5).y(), at.y(), 1e-6);
+    EXPECT_NEAR(slice->placeOf(3.5, 3).y() - at.y(), (other.y() - at.y()) / std::pow(0.8, i), 1e-6);
+  }
+  QTest::mouseDClick(slice, Qt::LeftButton, {}, at.toPoint());
+  ASSERT_TRUE(ready.wait());
+  EXPECT_NEAR(slice->placeOf(3.5, 3).y(), other.y(), 1e-6);
+}
+
+TEST_F(Inspector, TheSliceFollowsTheClipWithoutANewOne) {
+  QSignalSpy ready(slice, &DepthSlice::ready);
+  panel.showTab(InspectorPanel::Tab::Slice);
+  ASSERT_TRUE(!ready.empty() || ready.wait());
+  const auto volume = [this] { return slice->grab().toImage().pixelColor(slice->placeOf(3.5, 2.3).toPoint()); };
+  const QColor before = volume();
+  ViewState view;
+  view.clip.near = 3.5f;
+  session.setView(view);
+  EXPECT_NE(volume(), before);
+  QApplication::processEvents();
+  EXPECT_EQ(ready.size(), 1);
 }
 
 TEST_F(Inspector, TheBoxInNumbers) {
