@@ -45,7 +45,7 @@ Canvas::Canvas(Session& session, std::shared_ptr<const Display> display, QWidget
   setFocusPolicy(Qt::StrongFocus);
   setAttribute(Qt::WA_OpaquePaintEvent);
   setMinimumSize(120, 80);
-  connect(&renderer_, &Renderer::rendered, this, &Canvas::show);
+  connect(&renderer_, &Renderer::rendered, this, &Canvas::accept);
   connect(&renderer_, &Renderer::failed, &session_, &Session::say);
   connect(&session_, &Session::picturesChanged, this, &Canvas::follow);
   connect(&session_, &Session::viewChanged, this, &Canvas::follow);
@@ -151,7 +151,7 @@ void Canvas::request() {
   renderer_.request(std::move(request));
 }
 
-void Canvas::show(const Rendered& result) {
+void Canvas::accept(const Rendered& result) {
   if (!asked_.a && !asked_.b) return;
   shown_ = result;
   update();

@@ -72,7 +72,7 @@ class Canvas : public QWidget {
   void setViewport(const Viewport& viewport);
   void follow();
   void request();
-  void show(const Rendered& result);
+  void accept(const Rendered& result);
   void point(QPointF widget);
   void cutAt(QPoint pixel);
   void dragBox(QPointF to);

@@ -1,6 +1,5 @@
 #include "gui/renderer.h"
 
-#include <QMetaObject>
 #include <utility>
 
 namespace fathom::gui {
@@ -10,48 +9,47 @@ namespace {
 constexpr double kPatience = 0.03;  // seconds that the eye waits without a quick answer
 constexpr int kCoarsest = 8;        // times the request's step
 
+// How coarse the first answer has to be.
+int firstStep(const Compositor& compositor, const RenderRequest& request) {
+  int times = 1;
+  while (times < kCoarsest && compositor.estimate(request, times * request.step) > kPatience) times *= 2;
+  return times * request.step;
+}
+
 }  // namespace
 
 Renderer::Renderer(std::shared_ptr<const Display> display, QObject* parent)
-    : QObject(parent),
-      compositor_(std::move(display)),
-      thread_([this](std::stop_token stop) { run(std::move(stop)); }) {}
-
-Renderer::~Renderer() {
-  thread_.request_stop();
-  requests_.clear();
+    : QObject(parent), compositor_(std::move(display)) {
+  connect(&background_, &Background::failed, this, &Renderer::failed);
 }
 
 void Renderer::request(RenderRequest request) {
-  if (request.a || request.b)
-    requests_.put(std::move(request));
-  else
-    requests_.clear();
+  const bool none = !request.a && !request.b;
+  if (none || whole_) background_.clear();
+  whole_ = false;
+  if (!none) answerFirst(request);
 }
 
-void Renderer::run(std::stop_token stop) {
-  while (const auto taken = requests_.take(stop)) {
-    try {
-      answer(taken->value, {{}, taken->newer});
-    } catch (const Cancelled&) {
-    } catch (const std::exception& e) {
-      const QString reason = QString::fromUtf8(e.what());
-      QMetaObject::invokeMethod(
-          this, [this, reason] { emit failed(reason); }, Qt::QueuedConnection);
-    }
-  }
+void Renderer::answerFirst(const RenderRequest& request) {
+  background_.run([this, request](const Progress& progress) -> Background::Deliver {
+    const Rendered result = compositor_.make(request, firstStep(compositor_, request), progress);
+    return [this, result] {
+      const bool newer = background_.busy();
+      if (result.step != result.request.step && !newer) answerWhole(result.request);
+      emit rendered(result);
+    };
+  });
 }
 
-void Renderer::answer(const RenderRequest& request, const Progress& progress) {
-  int times = 1;
-  while (times < kCoarsest && compositor_.estimate(request, times * request.step) > kPatience) times *= 2;
-  if (times > 1) send(compositor_.make(request, times * request.step));
-  send(compositor_.make(request, request.step, progress));
-}
-
-void Renderer::send(Rendered result) {
-  QMetaObject::invokeMethod(
-      this, [this, sent = std::move(result)] { emit rendered(sent); }, Qt::QueuedConnection);
+void Renderer::answerWhole(const RenderRequest& request) {
+  whole_ = true;
+  background_.run([this, request](const Progress& progress) -> Background::Deliver {
+    const Rendered result = compositor_.make(request, request.step, progress);
+    return [this, result] {
+      whole_ = false;
+      emit rendered(result);
+    };
+  });
 }
 
 }  // namespace fathom::gui

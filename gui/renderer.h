@@ -4,10 +4,9 @@
 #include <QObject>
 #include <QString>
 #include <memory>
-#include <thread>
 
+#include "gui/background.h"
 #include "gui/compositor.h"
-#include "gui/newest.h"
 
 namespace fathom::gui {
 
@@ -16,10 +15,9 @@ class Renderer : public QObject {
 
  public:
   explicit Renderer(std::shared_ptr<const Display> display, QObject* parent = nullptr);
-  ~Renderer() override;
 
-  // Never blocks. What waits is forgotten. Of what is under way only the quick answer is still given, so that a drag
-  // shows something; the whole one stops at the next rows.
+  // Never blocks. What waits is forgotten. Of what is under way a first answer is still given, so that a drag shows
+  // something, but a whole one that takes long stops at the next rows. Without pictures there is no answer at all.
   void request(RenderRequest request);
 
  signals:
@@ -29,13 +27,12 @@ class Renderer : public QObject {
   void failed(const QString& reason);
 
  private:
-  void run(std::stop_token stop);
-  void answer(const RenderRequest& request, const Progress& progress);
-  void send(Rendered result);
+  void answerFirst(const RenderRequest& request);
+  void answerWhole(const RenderRequest& request);
 
-  Compositor compositor_;  // the thread's
-  Newest<RenderRequest> requests_;
-  std::jthread thread_;
+  Compositor compositor_;  // used in the background only
+  bool whole_ = false;     // what runs is the second, whole answer
+  Background background_;  // goes first, when its work is done
 };
 
 }  // namespace fathom::gui
