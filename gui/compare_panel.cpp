@@ -133,6 +133,7 @@ void ComparePanel::makeModes() {
     modes_->addAction(action);
     auto* button = new QToolButton;
     button->setDefaultAction(action);
+    button->setAutoRaise(true);
     button->setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Preferred);
     grid->addWidget(button, place / 2, place % 2);
     ++place;
@@ -228,7 +229,9 @@ void ComparePanel::showNumbers(const ComparedNumbers& numbers) {
   }
   int height = table_->horizontalHeader()->sizeHint().height() + 2 * table_->frameWidth();
   for (int row = 0; row < table_->rowCount(); ++row) height += table_->rowHeight(row);
-  table_->setFixedHeight(height + table_->horizontalScrollBar()->sizeHint().height());
+  const bool wide =
+      table_->columnCount() * table_->horizontalHeader()->minimumSectionSize() > table_->viewport()->width();
+  table_->setFixedHeight(height + (wide ? table_->horizontalScrollBar()->sizeHint().height() : 0));
   table_->show();
   QStringList notes;
   for (const std::string& note : numbers.notes) notes << QString::fromStdString(note);

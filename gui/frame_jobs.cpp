@@ -111,7 +111,7 @@ void FrameJobs::denoiseFrame(deep::Quality quality) {
         makePicture(file + " (" + kDenoised + ")", cli::denoiseFrame(request, sequence, frame, progress));
     return std::function<void()>([this, file, result] {
       frames_.setResult(file, kDenoised, result);
-      session_.say(tr("%1 denoised: it is B").arg(fileName(file)));
+      session_.say(tr("%1 is denoised: B shows it").arg(fileName(file)));
     });
   };
   jobs_.add({"denoise frame", tr("Denoising %1").arg(fileName(file)), work});

@@ -56,15 +56,13 @@ bool Frames::cached(int frame) const {
 void Frames::setStage(Show show, std::function<bool()> busy) {
   stage_ = std::move(show);
   stageBusy_ = std::move(busy);
-  if (originalA_) showA(originalA_);
+  if (originalA_) pass();
 }
 
-void Frames::showA(PicturePtr picture) {
-  originalA_ = picture;
-  if (stage_)
-    stage_(std::move(picture));
-  else
-    session_.setA(std::move(picture));
+void Frames::pass() {
+  if (stage_) return stage_(originalA_, originalB_);
+  session_.setA(originalA_);
+  session_.setB(originalB_);
 }
 
 // The frames of A are played, or else those of B.
@@ -98,11 +96,13 @@ void Frames::want() {
 void Frames::show() {
   const int frame = player_.frame();
   if (!ready(frame)) return;
-  PicturePtr picture = a_ ? cache_.find(a_->at(frame)) : nullptr;
-  if (picture) before_.reset();
-  if (picture && picture != originalA_) showA(picture);
-  if (!picture && a_ && !a_->made.isEmpty()) session_.say(tr("no %1").arg(QString::fromStdString(a_->at(frame))));
-  session_.setB(b_ ? cache_.find(b_->at(frame)) : nullptr);
+  const PicturePtr a = a_ ? cache_.find(a_->at(frame)) : nullptr, b = b_ ? cache_.find(b_->at(frame)) : nullptr;
+  if (a) before_.reset();
+  if (!a && a_ && !a_->made.isEmpty()) session_.say(tr("no %1").arg(QString::fromStdString(a_->at(frame))));
+  const bool changed = (a && a != originalA_) || b != originalB_;
+  if (a) originalA_ = a;
+  originalB_ = b;
+  if (changed) pass();
 }
 
 void Frames::readFailed(const std::string& path, const QString& reason) {

@@ -38,8 +38,8 @@ class Frames : public QObject {
   Q_OBJECT
 
  public:
-  // Takes a picture to the screen, at once or later.
-  using Show = std::function<void(PicturePtr picture)>;
+  // Takes the pictures of a frame to the screen, at once or later; b may be null.
+  using Show = std::function<void(const PicturePtr& a, const PicturePtr& b)>;
 
   explicit Frames(Session& session, QObject* parent = nullptr, FrameCache::Load load = {});
 
@@ -54,8 +54,8 @@ class Frames : public QObject {
   // Whether they are in the memory.
   bool cached(int frame) const;
 
-  // Puts something between A as it was read and the session, or takes it away (null): `show` gets A from now on, the
-  // one that is there at once. Playing waits while `busy`.
+  // Puts something between the pictures as they were read and the session, or takes it away (null): `show` gets them
+  // from now on, those that are there at once. Playing waits while `busy`.
   void setStage(Show show, std::function<bool()> busy);
   // What was made of the file of A by that name comes as B; it stays with its frame.
   void setResult(const std::string& file, const QString& made, PicturePtr picture);
@@ -81,13 +81,13 @@ class Frames : public QObject {
   void setFrames(int frame);
   void want();
   void show();
-  void showA(PicturePtr picture);
+  void pass();
   void readFailed(const std::string& path, const QString& reason);
 
   Session& session_;
   std::optional<Source> a_, b_;
   std::optional<Before> before_;  // until the first picture of A was read
-  PicturePtr originalA_;
+  PicturePtr originalA_, originalB_;
   Show stage_;
   std::function<bool()> stageBusy_;
   Player player_;

@@ -91,6 +91,8 @@ void PlacePanel::addControl(const char* name, const QString& label, const QStrin
   }
   control.slider->setObjectName(QString(name) + "Slider");
   control.slider->setRange(-kSteps, kSteps);
+  control.slider->setTickPosition(QSlider::TicksBelow);
+  control.slider->setTickInterval(kSteps);
   control.slider->setToolTip(tip);
   control.number->setObjectName(QString(name) + "Number");
   control.number->setToolTip(tip);

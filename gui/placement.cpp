@@ -37,7 +37,8 @@ Placement::Placement(Session& session, Frames& frames, QObject* parent)
   // The picture without the volume is better than that of another frame.
   connect(&background_, &Background::failed, this, [this](const QString& line) {
     session_.say(line);
-    session_.setA(original_);
+    session_.setA(a_);
+    session_.setB(b_);
   });
 }
 
@@ -55,9 +56,10 @@ void Placement::open(const QString& path) {
   } catch (const Error& e) {
     return session_.say(QString::fromStdString(e.what()));
   }
-  const auto stage = [this](PicturePtr picture) {
-    if (picture != original_) background_.clear();
-    original_ = std::move(picture);
+  const auto stage = [this](const PicturePtr& a, const PicturePtr& b) {
+    if (a != a_ || b != b_) background_.clear();
+    a_ = a;
+    b_ = b;
     place();
   };
   frames_.setStage(stage, [this] { return busy(); });
@@ -68,7 +70,8 @@ void Placement::remove() {
   if (!volume_) return;
   volume_.reset();
   background_.clear();
-  original_.reset();
+  a_.reset();
+  b_.reset();
   read_ = std::make_shared<Read>();
   frames_.setStage({}, {});
   emit changed();
@@ -81,22 +84,26 @@ void Placement::setTransform(const deep::Transform& transform) {
     return session_.say(QString::fromStdString(e.what()));
   }
   transform_ = transform;
-  if (volume_ && original_) place();
+  if (volume_ && a_) place();
   emit changed();
 }
 
 void Placement::place() {
-  const auto work = [this, original = original_, path = file(), transform = transform_,
+  const auto work = [this, a = a_, b = b_, path = file(), transform = transform_,
                      read = read_](const Progress& progress) -> Background::Deliver {
-    const deep::DeepImage& image = deepOf(*original, "to place something in");
+    const deep::DeepImage& image = deepOf(*a, "to place something in");
     if (read->path != path || !read->picture) *read = {path, loadPicture(path, {}, progress)};
     const deep::DeepImage& volume = deepOf(*read->picture, "to place");
     const PlacedDepths depths = depthsOf(image, volume);
-    progress.at(0.5);
-    PicturePtr placed = makePicture(original->path, deep::insert(image.copy(), volume.copy(), transform));
-    return [this, original, placed = std::move(placed), depths] {
-      if (original != original_) return;
-      session_.setA(placed);
+    const auto placed = [&](const PicturePtr& in) {
+      progress.at(0.5);
+      if (!in || !in->deep()) return in;
+      return makePicture(in->path, deep::insert(in->deep()->copy(), volume.copy(), transform));
+    };
+    return [this, a, b, placedA = placed(a), placedB = placed(b), depths] {
+      if (a != a_ || b != b_) return;
+      session_.setA(placedA);
+      session_.setB(placedB);
       if (std::exchange(depths_, depths) != depths) emit depthsChanged();
     };
   };

@@ -1,4 +1,4 @@
-// A volume, or any deep image, that is placed in A: moved and scaled while one looks.
+// A volume, or any deep image, that is placed in A, and in B where that is deep: moved and scaled while one looks.
 #pragma once
 
 #include <QObject>
@@ -35,9 +35,9 @@ class Placement : public QObject {
   bool busy() const { return background_.busy(); }
 
  public slots:
-  // A file or a pattern; takes the place of the one before. From now on A is shown with it.
+  // A file or a pattern; takes the place of the one before. From now on A and B are shown with it.
   void open(const QString& path);
-  // Shows A as it is again.
+  // Shows A and B as they are again.
   void remove();
   void setTransform(const fathom::deep::Transform& transform);
 
@@ -60,7 +60,7 @@ class Placement : public QObject {
   std::optional<Source> volume_;
   deep::Transform transform_;
   PlacedDepths depths_;
-  PicturePtr original_;         // A as it was read
+  PicturePtr a_, b_;            // as they were read
   std::shared_ptr<Read> read_;  // touched by the work in the background only
   Background background_;
 };

@@ -46,6 +46,7 @@ PlaybackBar::PlaybackBar(Frames& frames, QWidget* parent)
     : QToolBar(tr("Playback"), parent), frames_(frames), player_(frames.player()) {
   setObjectName("playback");
   setIconSize({16, 16});
+  setMovable(false);
   first_ = add(tr("First frame"), "|<", &Player::first);
   previous_ = add(tr("Previous frame"), "<", &Player::previous);
   play_ = add(tr("Play"), ">", &Player::toggle);
@@ -86,6 +87,7 @@ void PlaybackBar::makeControls() {
   frame_->setKeyboardTracking(false);
   frame_->setButtonSymbols(QAbstractSpinBox::NoButtons);
   frame_->setAlignment(Qt::AlignRight);
+  frame_->setMinimumWidth(fontMetrics().horizontalAdvance("000000"));
   addWidget(frame_);
   fps_ = new QDoubleSpinBox;
   fps_->setObjectName("fps");

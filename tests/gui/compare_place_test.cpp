@@ -126,7 +126,11 @@ TEST_F(PanelsTest, AVolumeIsPlacedMovedAndRemoved) {
   QTest::mouseClick(panel.findChild<QWidget*>("asRendered"), Qt::LeftButton);
   EXPECT_TRUE(placedAs({}));
   EXPECT_EQ(number->value(), 0);
+  frames_.openB(path("truth.exr"));  // gets it, too
+  ASSERT_TRUE(waitFor([&] { return session_.b() != nullptr; }));
+  EXPECT_EQ(session_.b()->deep()->samples(), session_.a()->deep()->samples());
   QTest::mouseClick(panel.findChild<QWidget*>("removeVolume"), Qt::LeftButton);
+  EXPECT_EQ(session_.b()->deep()->samples(), original->deep()->samples());
   EXPECT_EQ(session_.a(), original);
   EXPECT_FALSE(placement.active());
 }

@@ -145,7 +145,7 @@ TEST_F(FramesTest, AStageStandsBetweenTheFilesAndTheScreen) {
   frames_.open(path("a.0002.exr"));
   ASSERT_TRUE(shows("a.0002.exr"));
   std::vector<std::string> staged;
-  frames_.setStage([&](const PicturePtr& picture) { staged.push_back(nameOf(picture)); }, [] { return false; });
+  frames_.setStage([&](const PicturePtr& a, const PicturePtr&) { staged.push_back(nameOf(a)); }, [] { return false; });
   frames_.player().next();
   ASSERT_TRUE(waitFor([&] { return staged.size() == 2; }));
   EXPECT_THAT(staged, ElementsAre("a.0002.exr", "a.0004.exr"));
