@@ -68,6 +68,13 @@ MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent) {
   follow();
 }
 
+void MainWindow::showPanel(const QString& name) {
+  if (auto* dock = findChild<QDockWidget*>(name)) {
+    dock->show();
+    dock->raise();
+  }
+}
+
 void MainWindow::restore() {
   const QSettings settings;
   restoreGeometry(settings.value("geometry").toByteArray());

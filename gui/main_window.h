@@ -32,6 +32,8 @@ class MainWindow : public QMainWindow {
   FrameJobs& frameJobs() { return frameJobs_; }
   Placement& placement() { return placement_; }
 
+  // Brings a panel to the front: "inspector", "compare", "place", "depth".
+  void showPanel(const QString& name);
   // Places of the panels as they were when the last window was closed.
   void restore();
 
