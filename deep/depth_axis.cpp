@@ -24,14 +24,15 @@ std::vector<double> evenTicks(const DepthAxis& axis, int most) {
   double step = roundStep(length / most);
   if (std::floor(axis.far / step) - std::ceil(axis.near / step) + 1 > most) step = roundStep(step * 1.5);
   std::vector<double> result;
-  for (double i = std::ceil(axis.near / step); i * step <= axis.far; ++i) result.push_back(i * step);
+  const auto first = std::llround(std::ceil(axis.near / step)), last = std::llround(std::floor(axis.far / step));
+  for (auto i = first; i <= last; ++i) result.push_back(double(i) * step);
   return result;
 }
 
-std::vector<double> powerTicks(const DepthAxis& axis, std::initializer_list<double> factors, double every) {
+std::vector<double> powerTicks(const DepthAxis& axis, std::initializer_list<double> factors, int every) {
   std::vector<double> result;
-  const double first = std::floor(std::log10(axis.near) / every) * every;
-  for (double exponent = first; exponent <= std::log10(axis.far); exponent += every)
+  const int first = int(std::floor(std::log10(axis.near) / every)) * every, last = int(std::ceil(std::log10(axis.far)));
+  for (int exponent = first; exponent <= last; exponent += every)
     for (const double factor : factors) {
       const double depth = factor * std::pow(10, exponent);
       if (depth >= axis.near && depth <= axis.far) result.push_back(depth);
@@ -70,8 +71,7 @@ DepthAxis zoomed(const DepthAxis& axis, const DepthAxis& whole, double place, do
 std::vector<double> ticks(const DepthAxis& axis, int most) {
   if (!axis.logarithmic || axis.far < 10 * axis.near) return evenTicks(axis, most);
   std::vector<double> result = powerTicks(axis, {1, 2, 5}, 1);
-  for (double every = 1; int(result.size()) > most; every = every < 2 ? 2 : 2 * every)
-    result = powerTicks(axis, {1}, every);
+  for (int every = 1; int(result.size()) > most; every *= 2) result = powerTicks(axis, {1}, every);
   return result;
 }
 

@@ -51,8 +51,8 @@ void setCell(QTableWidget* table, int row, int column, const QString& text, doub
   table->setItem(row, column, item);
 }
 
-QString number(double value) {
-  return QString::number(value, 'g', 5);
+QString number(double value, int digits = 5) {
+  return QString::number(value, 'g', digits);
 }
 
 QString percent(double part) {
@@ -167,8 +167,8 @@ void BoxPanel::showBins(const deep::BoxStatistics& statistics) {
     setCell(bins_, row, 0, QString::number(row));
     setCell(bins_, row, 1, percent(pixels), pixels);
     setCell(bins_, row, 2, number(bin.depth));
-    setCell(bins_, row, 3, number(bin.alpha), bin.alpha);
-    setCell(bins_, row, 4, number(bin.energy));
+    setCell(bins_, row, 3, number(bin.alpha, 3), bin.alpha);
+    setCell(bins_, row, 4, number(bin.energy, 3));
     setCell(bins_, row, 5, percent(part), part);
   }
   bins_->setVisible(true);

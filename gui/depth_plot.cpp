@@ -181,7 +181,8 @@ void DepthPlot::paintTransmittance(QPainter& painter) const {
   const QRectF area = frame();
   const double step = 1 / devicePixelRatioF();
   std::vector<float> depths;
-  for (double x = 0; x <= area.width(); x += step) depths.push_back(float(axis_.depth(x / area.width())));
+  const int steps = int(area.width() / step);
+  for (int i = 0; i <= steps; ++i) depths.push_back(float(axis_.depth(i * step / area.width())));
   const std::vector<double> passing =
       deep::passingTo(*samples_.picture->deep(), samples_.pixel.x(), samples_.pixel.y(), depths);
   QPainterPath path;

@@ -14,7 +14,7 @@ constexpr int kSoon = 12;  // milliseconds
 QToolButton* makeButton(QAction* action, QWidget* parent) {
   auto* button = new QToolButton(parent);
   button->setDefaultAction(action);
-  button->setAutoRaise(true);
+  button->setAutoRaise(!action->isCheckable());
   return button;
 }
 
@@ -134,7 +134,7 @@ void InspectorPanel::describe(const PixelSamples& samples) {
                 ? tr("empty")
                 : tr("%1, alpha %2")
                       .arg(samples.samples.size() == 1 ? tr("1 sample") : tr("%1 samples").arg(samples.samples.size()))
-                      .arg(samples.alpha(), 0, 'g', 4);
+                      .arg(samples.alpha(), 0, 'g', 3);
   state_->setText(state);
   state_->setToolTip(state);
 }
