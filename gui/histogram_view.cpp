@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "gui/depth_painting.h"
+
 namespace fathom::gui {
 
 namespace {
@@ -16,11 +18,7 @@ constexpr double kMargin = 16, kTop = 6, kBottom = 22;  // around the bars, in p
 constexpr double kGripWidth = 9, kGripHeight = 20;
 constexpr double kLogRange = 1e4;  // between the highest bar and one that is just seen, with log counts
 constexpr double kZoomPerNotch = 0.8;
-
-QColor mix(const QColor& a, const QColor& b, double part) {
-  const auto between = [&](float from, float to) { return from + float(part) * (to - from); };
-  return QColor::fromRgbF(between(a.redF(), b.redF()), between(a.greenF(), b.greenF()), between(a.blueF(), b.blueF()));
-}
+constexpr double kKept = 0.72, kRemoved = 0.22;  // how far the bars are from the ground to the colour of text
 
 // A grip beside a plane, its round side outwards.
 QPainterPath grip(double x, double y, bool toTheLeft) {
@@ -34,10 +32,6 @@ QPainterPath grip(double x, double y, bool toTheLeft) {
   path.lineTo(x, y + kGripHeight);
   path.closeSubpath();
   return path;
-}
-
-QString textOf(double depth) {
-  return QString::number(std::abs(depth) < 1e-12 ? 0 : depth, 'g', 5);
 }
 
 }  // namespace
@@ -116,8 +110,8 @@ QPainterPath HistogramView::outline() const {
 
 // Bright where things are kept, dim where they are removed, and between the two where they fade.
 QBrush HistogramView::colours() const {
-  const QColor removed = mix(palette().color(QPalette::Base), palette().color(QPalette::Text), 0.22);
-  const QColor kept = mix(palette().color(QPalette::Base), palette().color(QPalette::Text), 0.72);
+  const QColor removed = between(palette(), kRemoved);
+  const QColor kept = between(palette(), kKept);
   const QColor inside = range_.inverted ? removed : kept, outside = range_.inverted ? kept : removed;
   if (!(range_.near < range_.far)) return outside;
   const QRectF box = area();
@@ -131,7 +125,9 @@ QBrush HistogramView::colours() const {
     if (depth < double(range_.near) || depth > double(range_.far)) return outside;
     const double nearPart = std::isinf(range_.near) || !(ramp > 0) ? 1 : (depth - double(range_.near)) / ramp;
     const double farPart = std::isinf(range_.far) || !(ramp > 0) ? 1 : (double(range_.far) - depth) / ramp;
-    return mix(outside, inside, std::clamp(std::min(nearPart, farPart), 0.0, 1.0));
+    const double fade = std::clamp(std::min(nearPart, farPart), 0.0, 1.0);
+    return between(palette(),
+                   range_.inverted ? kKept + fade * (kRemoved - kKept) : kRemoved + fade * (kKept - kRemoved));
   };
   constexpr double kStep = 1e-6;
   gradient.setColorAt(0, at(model_.shown().near));
@@ -149,14 +145,14 @@ QBrush HistogramView::colours() const {
 
 void HistogramView::paintAxis(QPainter& painter) const {
   const QRectF box = area();
-  const QColor text = mix(palette().color(QPalette::Window), palette().color(QPalette::WindowText), 0.65);
+  const QColor text = between(palette(), 0.65);
   const QFontMetrics metrics = painter.fontMetrics();
-  painter.setPen(mix(palette().color(QPalette::Window), palette().color(QPalette::WindowText), 0.3));
+  painter.setPen(between(palette(), 0.3));
   painter.drawLine(box.bottomLeft(), box.bottomRight());
   double free = rect().left();  // labels do not meet
   for (const double tick : deep::ticks(model_.shown(), std::max(2, int(box.width() / 60)))) {
     const double x = xOf(tick);
-    const QString label = textOf(tick);
+    const QString label = depthText(tick);
     const double width = metrics.horizontalAdvance(label);
     painter.setPen(text);
     painter.drawLine(QPointF(x, box.bottom()), QPointF(x, box.bottom() + 3));
@@ -166,16 +162,16 @@ void HistogramView::paintAxis(QPainter& painter) const {
   }
 }
 
-// The samples under the cursor, at the bottom of the bars.
+// The samples under the cursor, below the axis.
 void HistogramView::paintMarks(QPainter& painter) const {
   const QRectF box = area();
   painter.setPen(Qt::NoPen);
   painter.setBrush(palette().color(QPalette::Link));
   for (const deep::Range& mark : marks_) {
-    if (!std::isfinite(mark.z)) continue;
-    const double begin = xOf(double(mark.z)), end = xOf(double(mark.zBack));
-    const QRectF line(begin - 0.75, box.bottom() - 5, std::max(1.5, end - begin), 5);
-    painter.drawRect(line.intersected(box));
+    const double begin = xOf(double(mark.z)), end = std::min(xOf(double(mark.zBack)), box.right());
+    if (begin <= box.right() && end >= box.left())
+      painter.drawRect(
+          QRectF(QPointF(std::max(begin, box.left()) - 1, box.bottom()), QPointF(end + 1, box.bottom() + 5)));
   }
 }
 
@@ -211,11 +207,11 @@ void HistogramView::paintHandles(QPainter& painter) const {
 void HistogramView::paintHover(QPainter& painter) const {
   const QRectF box = area();
   if (hover_ < box.left() || hover_ > box.right()) return;
-  const QString text = textOf(depthAt(hover_));
+  const QString text = depthText(depthAt(hover_));
   const QFontMetrics metrics = painter.fontMetrics();
   const double width = metrics.horizontalAdvance(text) + 8;
   const double x = hover_ + 12 + width > box.right() ? hover_ - 12 - width : hover_ + 12;
-  painter.setPen(QPen(mix(palette().color(QPalette::Base), palette().color(QPalette::Text), 0.5), 1, Qt::DotLine));
+  painter.setPen(QPen(between(palette(), 0.5), 1, Qt::DotLine));
   painter.drawLine(QPointF(hover_, box.top()), QPointF(hover_, box.bottom()));
   const QRectF label(x, box.top() + 4, width, metrics.height() + 2);
   painter.setPen(Qt::NoPen);
