@@ -1,5 +1,6 @@
 #include "gui/compositor.h"
 
+#include <QPainter>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -129,6 +130,17 @@ Rendered Compositor::make(const RenderRequest& request, int step, const Progress
   made.a = shrunk(made.a, times);
   made.b = shrunk(made.b, times);
   return made;
+}
+
+QImage joined(const Rendered& rendered) {
+  const QImage &a = rendered.a, &b = rendered.b;
+  if (a.isNull() || b.isNull()) return a.isNull() ? b : a;
+  QImage both(a.width() + b.width(), std::max(a.height(), b.height()), QImage::Format_RGB32);
+  both.fill(Qt::black);
+  QPainter painter(&both);
+  painter.drawImage(0, 0, a);
+  painter.drawImage(a.width(), 0, b);
+  return both;
 }
 
 }  // namespace fathom::gui

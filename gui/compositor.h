@@ -34,6 +34,9 @@ struct Rendered {
   ValueRange ends;       // of the false colours
 };
 
+// The one image that there is, or A and B beside one another.
+QImage joined(const Rendered& rendered);
+
 class Compositor {
  public:
   explicit Compositor(std::shared_ptr<const Display> display) : display_(std::move(display)) {}

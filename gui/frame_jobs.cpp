@@ -176,8 +176,9 @@ void FrameJobs::saveDeep(const QString& path) {
   });
 }
 
-void FrameJobs::savePng(const QString& path, const QImage& image) {
-  addSaving(path, [image](const std::string& to) {
+void FrameJobs::savePng(const QString& path, const std::function<QImage()>& make) {
+  addSaving(path, [make](const std::string& to) {
+    const QImage image = make();
     QSaveFile file(QString::fromStdString(to));
     if (!file.open(QIODevice::WriteOnly) || !image.save(&file, "PNG") || !file.commit())
       fail("{}: expected a file that can be written, found: {}", to, oneLine(file.errorString().toStdString()));

@@ -37,8 +37,8 @@ class FrameJobs : public QObject {
   // What is seen, within the clip range: flattened, or with its samples (hard planes only), as EXR.
   void saveFlattened(const QString& path);
   void saveDeep(const QString& path);
-  // A picture as it is on the screen.
-  void savePng(const QString& path, const QImage& image);
+  // What `make` gives; it is called in another thread.
+  void savePng(const QString& path, const std::function<QImage()>& make);
 
  private:
   bool canDenoise();

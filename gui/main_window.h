@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "gui/canvas.h"
+#include "gui/display.h"
 #include "gui/frame_jobs.h"
 #include "gui/frames.h"
 #include "gui/jobs.h"
@@ -52,9 +53,12 @@ class MainWindow : public QMainWindow {
   void addDepthMenu();
   void addCompareMenu();
   void addFrameMenu();
+  void addProcessMenu();
   void addWindowMenu();
   void addHelpMenu();
-  void askForFile(const QString& title, void (Frames::*open)(const QString&));
+  QString folder() const;  // of A
+  void open(const QString& title, void (Frames::*take)(const QString&));
+  void save(const QString& title, const QString& suffix, const std::function<void(const QString& path)>& write);
   void setComparison(Comparison comparison);
   void follow();
 
@@ -63,6 +67,7 @@ class MainWindow : public QMainWindow {
   Jobs jobs_;
   FrameJobs frameJobs_{session_, frames_, jobs_};
   Placement placement_{session_, frames_};
+  std::shared_ptr<const Display> display_;
   Canvas* canvas_;
   ViewBar* viewBar_;
   DepthPanel* depth_;

@@ -137,10 +137,10 @@ TEST_F(FrameJobsTest, WhatIsOpenIsNotWrittenOver) {
 TEST_F(FrameJobsTest, SavesAPicture) {
   QImage image(4, 3, QImage::Format_RGB888);
   image.fill(Qt::red);
-  frameJobs_.savePng(path("a.png"), image);
+  frameJobs_.savePng(path("a.png"), [image] { return image; });
   finish();
   EXPECT_EQ(QImage(path("a.png")).pixelColor(1, 1), QColor(Qt::red));
-  frameJobs_.savePng(path("missing/a.png"), image);
+  frameJobs_.savePng(path("missing/a.png"), [image] { return image; });
   finish();
   EXPECT_TRUE(said_.contains("missing/a.png"));
 }

@@ -1,0 +1,109 @@
+// The window as a whole: its keys, what its title and its status bar say.
+#include "gui/main_window.h"
+
+#include <gtest/gtest.h>
+
+#include <QLabel>
+#include <QMenuBar>
+#include <QStatusBar>
+#include <QtTest>
+#include <map>
+
+#include "gui/canvas.h"
+#include "gui/key_sheet.h"
+
+namespace fathom::gui {
+namespace {
+
+class MainWindowTest : public ::testing::Test {
+ protected:
+  MainWindowTest() {
+    window_.show();
+    window_.frames().open(FATHOM_DEMO "/sequence.####.deep.exr");
+    EXPECT_TRUE(QTest::qWaitFor([&] { return window_.session().a() != nullptr; }, 20000));
+  }
+  void press(Qt::Key key, Qt::KeyboardModifiers modifiers = Qt::NoModifier) {
+    QTest::keyClick(&window_, key, modifiers);
+  }
+  const ViewState& view() { return window_.session().view(); }
+  MainWindow window_;
+};
+
+TEST_F(MainWindowTest, TheTitleSaysWhatTheFileIs) {
+  EXPECT_TRUE(window_.windowTitle().startsWith("sequence.0001.deep.exr (deep, 192 x 108, "))
+      << window_.windowTitle().toStdString();
+}
+
+TEST_F(MainWindowTest, AnUnreadableFileIsALineAndThePictureStays) {
+  const PicturePtr before = window_.session().a();
+  window_.frames().open("/nowhere/nothing.exr");
+  EXPECT_TRUE(QTest::qWaitFor([&] { return window_.statusBar()->currentMessage().contains("nothing.exr"); }, 20000));
+  EXPECT_EQ(window_.session().a(), before);
+}
+
+TEST_F(MainWindowTest, KeysOfTheView) {
+  press(Qt::Key_G);
+  EXPECT_EQ(view().isolate, Isolate::Green);
+  press(Qt::Key_C);
+  EXPECT_EQ(view().isolate, Isolate::All);
+  press(Qt::Key_BracketRight);
+  EXPECT_EQ(view().display.exposure, 0.5f);
+  auto* canvas = window_.findChild<Canvas*>();
+  press(Qt::Key_F);
+  const double fitted = canvas->zoom();
+  press(Qt::Key_Plus);
+  EXPECT_DOUBLE_EQ(canvas->zoom(), 2 * fitted);
+  press(Qt::Key_F);
+  EXPECT_DOUBLE_EQ(canvas->zoom(), fitted);
+}
+
+TEST_F(MainWindowTest, KeysOfTheDepth) {
+  press(Qt::Key_X);
+  EXPECT_TRUE(view().clip.inverted);
+  press(Qt::Key_Backspace);
+  EXPECT_TRUE(view().clip.isAll());
+}
+
+TEST_F(MainWindowTest, KeysOfTheFrames) {
+  Player& player = window_.frames().player();
+  press(Qt::Key_Right);
+  EXPECT_EQ(player.frame(), 2);
+  press(Qt::Key_I);
+  EXPECT_EQ(player.in(), 2);
+  press(Qt::Key_End);
+  press(Qt::Key_O);
+  EXPECT_EQ(player.out(), 3);
+  press(Qt::Key_Left);
+  EXPECT_EQ(player.frame(), 2);
+}
+
+TEST_F(MainWindowTest, SpaceTogglesAAndB) {
+  window_.frames().openB(FATHOM_DEMO "/sequence.####.ref.exr");
+  ASSERT_TRUE(QTest::qWaitFor([&] { return window_.session().b() != nullptr; }, 20000));
+  press(Qt::Key_Space);
+  EXPECT_EQ(view().comparison, Comparison::B);
+  press(Qt::Key_Space);
+  EXPECT_EQ(view().comparison, Comparison::A);
+  press(Qt::Key_W);
+  EXPECT_EQ(view().comparison, Comparison::Wipe);
+}
+
+// One key, one meaning; and the sheet has them all.
+TEST_F(MainWindowTest, NoKeyIsGivenTwice) {
+  std::map<QString, QString> taken;
+  for (const QAction* action : window_.findChildren<QAction*>())
+    for (const QKeySequence& key : action->shortcuts()) {
+      const auto [found, isNew] = taken.emplace(key.toString(), action->text());
+      EXPECT_TRUE(isNew) << key.toString().toStdString() << ": " << found->second.toStdString() << " and "
+                         << action->text().toStdString();
+    }
+  EXPECT_GT(taken.size(), 30u);
+  const KeySheet sheet(*window_.menuBar(), {}, nullptr);
+  QStringList texts;
+  for (const QLabel* label : sheet.findChildren<QLabel*>()) texts << label->text();
+  for (const auto& [key, text] : taken)
+    EXPECT_TRUE(texts.join("\n").contains(key.toHtmlEscaped())) << key.toStdString();
+}
+
+}  // namespace
+}  // namespace fathom::gui
