@@ -26,6 +26,37 @@ PlacedDepths depthsOf(const deep::DeepImage& image, const deep::DeepImage& volum
   return depths;
 }
 
+// A frame has many channels, of which a few are seen.
+constexpr size_t kFewChannels = 12;
+
+bool isWorthADraft(const Picture& picture) {
+  return picture.deep() && picture.deep()->channels.size() > kFewChannels;
+}
+
+// The image with the channels that it takes to see a layer.
+deep::DeepImage copyForLayer(const deep::DeepImage& image, const std::vector<std::string>& layer) {
+  deep::DeepImage result = image.copyLayout();
+  for (const deep::Channel& channel : image.channels) {
+    const bool placing = channel.name == "A" || channel.name == "Z" || channel.name == "ZBack";
+    if (!placing && std::ranges::find(layer, channel.name) == layer.end()) continue;
+    deep::Channel& copy = result.add(channel.name, channel.type);
+    std::ranges::copy(channel.values, copy.values.begin());
+    std::ranges::copy(channel.ids, copy.ids.begin());
+  }
+  return result;
+}
+
+// The picture with the volume; a draft has no channels but those of the layer, and says that it has all.
+PicturePtr placedIn(const PicturePtr& in, const deep::DeepImage& volume, const deep::Transform& transform,
+                    const std::string* draftLayer) {
+  if (!in || !in->deep()) return in;
+  const Layer* layer = draftLayer ? in->layer(*draftLayer) : nullptr;
+  if (!layer) return makePicture(in->path, deep::insert(in->deep()->copy(), volume.copy(), transform));
+  deep::DeepImage seen =
+      deep::insert(copyForLayer(*in->deep(), layer->channels), copyForLayer(volume, layer->channels), transform);
+  return std::make_shared<Picture>(Picture{in->path, std::move(seen), in->layers});
+}
+
 int nearestOf(const std::vector<int>& frames, int frame) {
   return *std::ranges::min_element(frames, {}, [&](int other) { return std::abs(int64_t(other) - frame); });
 }
@@ -84,27 +115,27 @@ void Placement::setTransform(const deep::Transform& transform) {
     return session_.say(QString::fromStdString(e.what()));
   }
   transform_ = transform;
-  if (volume_ && a_) place();
+  if (volume_ && a_) place(isWorthADraft(*a_));
   emit changed();
 }
 
-void Placement::place() {
-  const auto work = [this, a = a_, b = b_, path = file(), transform = transform_,
+void Placement::place(bool draft) {
+  const auto work = [this, draft, a = a_, b = b_, path = file(), transform = transform_, layer = session_.view().layer,
                      read = read_](const Progress& progress) -> Background::Deliver {
     const deep::DeepImage& image = deepOf(*a, "to place something in");
-    if (read->path != path || !read->picture) *read = {path, loadPicture(path, {}, progress)};
+    if (read->path != path || !read->picture) *read = {path, loadPicture(path, {}, progress), {}, {}};
     const deep::DeepImage& volume = deepOf(*read->picture, "to place");
-    const PlacedDepths depths = depthsOf(image, volume);
-    const auto placed = [&](const PicturePtr& in) {
-      progress.at(0.5);
-      if (!in || !in->deep()) return in;
-      return makePicture(in->path, deep::insert(in->deep()->copy(), volume.copy(), transform));
-    };
-    return [this, a, b, placedA = placed(a), placedB = placed(b), depths] {
+    if (std::exchange(read->a, a) != a) read->depths = depthsOf(image, volume);
+    progress.at(0.3);
+    const PicturePtr placedA = placedIn(a, volume, transform, draft ? &layer : nullptr);
+    progress.at(0.6);
+    const PicturePtr placedB = placedIn(b, volume, transform, draft ? &layer : nullptr);
+    return [this, draft, a, b, placedA, placedB, depths = read->depths] {
       if (a != a_ || b != b_) return;
       session_.setA(placedA);
       session_.setB(placedB);
       if (std::exchange(depths_, depths) != depths) emit depthsChanged();
+      if (draft && !background_.busy()) place();
     };
   };
   background_.run(work);

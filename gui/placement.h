@@ -52,8 +52,11 @@ class Placement : public QObject {
   struct Read {
     std::string path;
     PicturePtr picture;
+    PicturePtr a;  // what `depths` are of, beside the volume
+    PlacedDepths depths;
   };
-  void place();
+  // A draft has the channels that are seen only; the whole follows when the volume rests.
+  void place(bool draft = false);
 
   Session& session_;
   Frames& frames_;

@@ -8,9 +8,11 @@
 #include <QToolButton>
 
 #include "deep/compare.h"
+#include "deep/flatten.h"
 #include "deep/io.h"
 #include "deep/ops/insert.h"
 #include "flat/error.h"
+#include "flat/io.h"
 #include "gui/compare_panel.h"
 #include "gui/place_panel.h"
 #include "tests/reference/random_deep.h"
@@ -64,6 +66,15 @@ TEST_F(PanelsTest, OtherBinsAreComparedFlattened) {
   EXPECT_GT(numbers.parts[0].relMse, 0);
   ASSERT_EQ(numbers.notes.size(), 1u);
   EXPECT_THAT(numbers.notes[0], ::testing::StartsWith("flattened only"));
+}
+
+TEST_F(PanelsTest, ADeepImageIsComparedWithAFlatOne) {
+  flat::write(folder_ / "flat.exr", deep::flatten(deep::read(folder_ / "truth.exr")));
+  open("noisy.exr", "flat.exr");
+  const auto flat = compareNumbers(*session_.a(), *session_.b(), {});
+  const auto deep = compareNumbers(*session_.a(), *loadPicture(folder_ / "truth.exr"), {});
+  ASSERT_EQ(flat.parts.size(), 1u);
+  EXPECT_FLOAT_EQ(float(flat.parts[0].relMse), float(deep.parts[0].relMse));
 }
 
 TEST_F(PanelsTest, ThePanelShowsModesAndNumbers) {
@@ -133,6 +144,21 @@ TEST_F(PanelsTest, AVolumeIsPlacedMovedAndRemoved) {
   EXPECT_EQ(session_.b()->deep()->samples(), original->deep()->samples());
   EXPECT_EQ(session_.a(), original);
   EXPECT_FALSE(placement.active());
+}
+
+TEST_F(PanelsTest, WhileItMovesThereIsADraftWithTheChannelsThatAreSeen) {
+  open("noisy.exr");
+  std::vector<size_t> seen;
+  Placement placement(session_, frames_);
+  placement.open(path("other.exr"));
+  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
+  const size_t all = session_.a()->deep()->channels.size();
+  QObject::connect(&session_, &Session::picturesChanged,
+                   [&] { seen.push_back(session_.a()->deep()->channels.size()); });
+  placement.setTransform({.z = 1});
+  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
+  EXPECT_THAT(seen, ::testing::ElementsAre(5, all));  // R G B A Z
+  EXPECT_GT(all, 5u);
 }
 
 TEST_F(PanelsTest, WhatCannotBePlacedIsSaidAndAStaysAsItIs) {
