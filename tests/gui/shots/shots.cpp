@@ -1,6 +1,6 @@
 // Screenshots of the real window, on the frames that the project's images have, or the bundled ones: to be looked at.
 //
-//   xvfb-run -a -s "-screen 0 1600x1000x24" build/bin/view_shots OUTPUT_FOLDER [NAME]
+//   ./run shots, or under any X server: build/bin/view_shots OUTPUT_FOLDER [NAME]
 #include <fmt/format.h>
 
 #include <QApplication>
@@ -11,6 +11,8 @@
 #include <string>
 
 #include "deep/ops/transform.h"
+#include "gui/canvas.h"
+#include "gui/inspector_panel.h"
 #include "gui/main_window.h"
 #include "gui/theme.h"
 
@@ -92,12 +94,20 @@ int run(const std::string& folder, const std::string& only) {
   shots.take("slice", render("staircase2.deep.exr"), "", [&](MainWindow& window) {
     window.session().setPin(QPoint(150, 100));
     changeView(window, [](ViewState& view) { view.layer = std::string("Z"); });
+    window.findChild<InspectorPanel*>()->showTab(InspectorPanel::Tab::Slice);
   });
   shots.take("wipe", render("veach-ajar.deep.exr"), render("veach-ajar.ref.exr"), [&](MainWindow& window) {
     changeView(window, [](ViewState& view) { view.comparison = Comparison::Wipe; });
+    window.showPanel("compare");
   });
   shots.take("error", render("veach-ajar.deep.exr"), render("veach-ajar.ref.exr"), [&](MainWindow& window) {
     changeView(window, [](ViewState& view) { view.comparison = Comparison::RelativeError; });
+  });
+  shots.take("values", demo("sequence.0001.deep.exr"), "", [&](MainWindow& window) {
+    expose(-1)(window);
+    window.session().setBox(Box{80, 40, 120, 60});
+    window.findChild<InspectorPanel*>()->showTab(InspectorPanel::Tab::Box);
+    window.findChild<Canvas*>()->zoomTo(64);
   });
   shots.take("placed", demo("sequence.0001.deep.exr"), "", [&](MainWindow& window) {
     expose(-1)(window);
