@@ -100,6 +100,23 @@ Buffer<uint32_t> countSamples(const DeepImage& image, const Box& box, int step, 
   return result;
 }
 
+Buffer<uint8_t> findNonFinite(const DeepImage& image, const Box& box, int step, const DepthRange& range,
+                              const std::vector<std::string>& channels) {
+  const Depths depths{image.get("Z"), image.tryGet("ZBack")};
+  const RangeCut cut(range);
+  std::vector<std::span<const float>> planes;
+  for (const std::string& channel : channels) planes.push_back(image.get(channel));
+  const auto isSpoiled = [&](size_t i) {
+    return std::ranges::any_of(planes, [&](const auto& plane) { return !isFinite(plane[i]); });
+  };
+  Buffer<uint8_t> result(pixelsOf(box, step), 0);
+  forPixels(image, box, step, [&](size_t to, size_t pixel) {
+    for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
+      if (isSpoiled(i) && remaining(cut, depths.range(i), 0)) result[to] = 1;
+  });
+  return result;
+}
+
 std::optional<float> nearestDepth(const DeepImage& image, int x, int y) {
   const auto z = image.get("Z"), alpha = image.get("A");
   if (!image.dataWindow.contains(x, y)) return {};

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "deep/depth_range.h"
 #include "deep/image.h"
@@ -23,6 +25,11 @@ Buffer<uint64_t> mostSeen(const DeepImage& image, const Box& box, int step, cons
 
 // How many samples of each pixel something is left of. Throws Error where Z is missing, but for the range that is all.
 Buffer<uint32_t> countSamples(const DeepImage& image, const Box& box, int step, const DepthRange& range);
+
+// Per pixel 1 where a sample of which something is left has a value that compositing takes for 0 (see finiteOrZero) in
+// one of `channels`, which must be there and not UINT. Throws Error where Z is missing.
+Buffer<uint8_t> findNonFinite(const DeepImage& image, const Box& box, int step, const DepthRange& range,
+                              const std::vector<std::string>& channels);
 
 // Where the nearest sample with alpha of a pixel begins. Throws Error where A or Z is missing.
 std::optional<float> nearestDepth(const DeepImage& image, int x, int y);

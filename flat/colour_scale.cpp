@@ -52,9 +52,10 @@ std::array<float, 3> signedColour(float t) {
 
 std::array<float, 3> identifierColour(uint32_t id) {
   if (id == 0) return {0, 0, 0};
+  // The golden section of the circle from one number to the next: hues of small numbers keep their distance.
   const uint32_t bits = mixed(id);
   return toSrgb(
-      {0.55 + 0.3 * (bits >> 24) / 255, 0.07 + 0.06 * (bits >> 16 & 255) / 255, 360.0 * (bits & 0xffff) / 65536});
+      {0.55 + 0.3 * (bits >> 24) / 255, 0.07 + 0.06 * (bits >> 16 & 255) / 255, 360.0 * (id * 0x9e3779b9u) / 0x1p32});
 }
 
 }  // namespace fathom::flat

@@ -64,6 +64,10 @@ bool covers(const Seen& seen, size_t i) {
   return seen.alpha.empty() || seen.alpha[i] != 0;
 }
 
+bool isSpoiled(const Seen& seen, size_t i) {
+  return !seen.spoiled.empty() && seen.spoiled[i] != 0;
+}
+
 // The channels that are looked at: one that is isolated where there are three, or else all.
 std::vector<size_t> chosen(const Seen& seen, Isolate isolate) {
   std::vector<size_t> all(seen.values.size());
@@ -125,7 +129,10 @@ QImage colourLight(const Seen& seen, const ViewState& state, const Display& disp
     transform(rgba.data(), seen.width, to);
     if (!marks.clipped && !marks.nan) return;
     for (int x = 0; x < seen.width; ++x) {
-      to[x] = marked(lightOf(seen, state.isolate, first + size_t(x)), gain, marks, to[x]);
+      if (isSpoiled(seen, first + size_t(x)) && marks.nan)
+        to[x] = kMarkNan;
+      else
+        to[x] = marked(lightOf(seen, state.isolate, first + size_t(x)), gain, marks, to[x]);
     }
   });
 }
@@ -148,8 +155,9 @@ QImage colourNumbers(const Seen& seen, const ViewState& state, const ValueRange&
   const float gain = kind == Kind::Scalar || kind == Kind::Variance ? std::exp2(params.exposure) : 1;
   return makePixels(seen, [&](size_t i) {
     const float value = numberOf(seen, i);
-    if (!std::isfinite(value)) return params.markNan ? kMarkNan : kBlack;
-    const bool nothing = kind == Kind::Count ? value == 0 : !covers(seen, i);
+    const bool wrong = isSpoiled(seen, i) || std::isnan(value) || (std::isinf(value) && kind != Kind::Depth);
+    if (wrong && params.markNan) return kMarkNan;
+    const bool nothing = !std::isfinite(value) || (kind == Kind::Count ? value == 0 : !covers(seen, i));
     return nothing ? kBlack : lookUp(colours, (value * gain - low) * scale);
   });
 }

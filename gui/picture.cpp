@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+#include <span>
 
 #include "cli/chain_source.h"
 #include "deep/channels.h"
+#include "flat/finite.h"
+#include "flat/parallel.h"
 
 namespace fathom::gui {
 
@@ -81,6 +85,28 @@ std::vector<Layer> layersOf(const std::vector<NamedChannel>& channels) {
   return layers;
 }
 
+bool anyNonFinite(std::span<const float> values, bool depths) {
+  constexpr size_t kRun = 4096;  // counted without a look at each, so that many are counted at once
+  for (size_t first = 0; first < values.size(); first += kRun) {
+    size_t count = 0;
+    for (const float value : values.subspan(first, std::min(kRun, values.size() - first)))
+      count += depths ? std::isnan(value) : !isFinite(value);
+    if (count > 0) return true;
+  }
+  return false;
+}
+
+// Looks at the values of each layer; valuesOf(channel) are a channel's.
+template <class ValuesOf>
+void findNonFinite(std::vector<Layer>& layers, const ValuesOf& valuesOf) {
+  parallelFor(0, int(layers.size()), [&](int i) {
+    Layer& layer = layers[size_t(i)];
+    layer.nonFinite = std::ranges::any_of(layer.channels, [&](const std::string& channel) {
+      return anyNonFinite(valuesOf(channel), layer.kind == Layer::Kind::Depth);
+    });
+  });
+}
+
 }  // namespace
 
 const Box& Picture::dataWindow() const {
@@ -110,6 +136,7 @@ std::vector<Layer> layersOf(const deep::DeepImage& image) {
   for (const deep::Channel& channel : image.channels)
     channels.push_back({channel.name, channel.type == deep::PixelType::Uint});
   std::vector<Layer> layers = layersOf(channels);
+  findNonFinite(layers, [&](const std::string& channel) { return image.tryGet(channel); });
   layers.push_back({"samples per pixel", {}, Layer::Kind::Count});
   return layers;
 }
@@ -117,7 +144,10 @@ std::vector<Layer> layersOf(const deep::DeepImage& image) {
 std::vector<Layer> layersOf(const flat::Image& image) {
   std::vector<NamedChannel> channels;
   for (const flat::Plane& plane : image.planes) channels.push_back({plane.name, false});
-  return layersOf(channels);
+  std::vector<Layer> layers = layersOf(channels);
+  findNonFinite(layers,
+                [&](const std::string& channel) -> std::span<const float> { return image.get(channel).values; });
+  return layers;
 }
 
 PicturePtr makePicture(std::string path, std::variant<deep::DeepImage, flat::Image> image) {

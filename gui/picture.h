@@ -26,6 +26,7 @@ struct Layer {
   std::string name;                   // "RGBA", "diffuse", "N", "Z", "samples per pixel"
   std::vector<std::string> channels;  // in the order R G B A, X Y Z
   Kind kind;
+  bool nonFinite = false;  // whether one of the values is no number, or infinite; of depths only the former counts
 };
 
 struct Picture {

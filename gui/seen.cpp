@@ -45,6 +45,11 @@ void compositeBand(const deep::DeepImage& image, const deep::DepthRange& clip, c
   if (!alpha.empty()) std::ranges::copy(made.get(alpha).values, seen.alpha.data() + band.first);
 }
 
+void spoilBand(const deep::DeepImage& image, const deep::DepthRange& clip, const Band& band, Seen& seen) {
+  std::ranges::copy(deep::findNonFinite(image, band.box, seen.step, clip, seen.layer.channels),
+                    seen.spoiled.data() + band.first);
+}
+
 void countBand(const deep::DeepImage& image, const deep::DepthRange& clip, const Band& band, Seen& seen) {
   std::ranges::transform(deep::countSamples(image, band.box, seen.step, clip), seen.values[0].data() + band.first,
                          [](uint32_t count) { return float(count); });
@@ -98,6 +103,8 @@ Seen see(const Picture& picture, const std::string& layerName, const deep::Depth
   const bool composited = layer->kind != Kind::Count && layer->kind != Kind::Identifier;
   if (!alpha.empty() && composited) seen.alpha = Buffer<float>(seen.pixels(), 0.0f);
 
+  const bool spoiled = picture.deep() && layer->nonFinite && layer->kind != Kind::Depth;
+  if (spoiled) seen.spoiled = Buffer<uint8_t>(seen.pixels(), 0);
   for (int row = 0; row < seen.height; row += kBandRows) {
     progress.at(double(row) / seen.height);
     const Box rows{box.x0, box.y0 + row * step, box.x1, std::min(box.y1, box.y0 + (row + kBandRows) * step)};
@@ -110,6 +117,7 @@ Seen see(const Picture& picture, const std::string& layerName, const deep::Depth
       identifyBand(*picture.deep(), clip, channels[0], band, seen);
     else
       compositeBand(*picture.deep(), clip, channels, alpha, band, seen);
+    if (spoiled) spoilBand(*picture.deep(), clip, band, seen);
   }
   return seen;
 }

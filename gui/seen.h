@@ -21,6 +21,8 @@ struct Seen {
   std::vector<Buffer<float>> values = {};  // by channel without A, premultiplied where the picture's are; counts
   Buffer<float> alpha = {};                // empty where there is none
   Buffer<uint32_t> ids = {};               // in place of values: of the sample that is seen most, 0 where none is
+  // 1 where a sample's value is no number and compositing took it for 0; empty where there is none in the picture.
+  Buffer<uint8_t> spoiled = {};
 
   size_t pixels() const { return size_t(width) * size_t(height); }
   // The place of the image's pixel in the planes; with a step, that of the pixel which stands for it. -1: outside.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <QTest>
+#include <limits>
 #include <vector>
 
 #include "flat/error.h"
@@ -197,6 +198,25 @@ TEST(Compositor, WindowsOfTheTwoMayDiffer) {
   EXPECT_LT(qRed(difference.pixel(4, 4)), qBlue(difference.pixel(4, 4)) - 50);  // only B
   request.state.comparison = Comparison::RelativeError;
   EXPECT_EQ(compositor.make(request, 1).a.pixel(2, 2), qRgb(0, 0, 0));
+}
+
+TEST(Compositor, SamplesThatAreNoNumberAreMarkedWhereTheyAreLeft) {
+  Compositor compositor(display());
+  reference::Pixels pixels(4, {{2, 2, 0.5f, 0.5f, 7}, {5, 5, 1, 0.25f, 9}});
+  deep::DeepImage image = reference::makeDeep(pixels, 2);
+  image.add("G", deep::PixelType::Float).values.fill(0);
+  image.find("R")->values[2] = std::numeric_limits<float>::quiet_NaN();  // the front sample of the second pixel
+  RenderRequest request = requestFor(gui::makePicture("poisoned.exr", std::move(image)));
+  EXPECT_TRUE(request.a->layer("RGBA")->nonFinite);
+  EXPECT_FALSE(request.a->layer("Z")->nonFinite);
+  QImage shown = compositor.make(request, 1).a;
+  EXPECT_NE(shown.pixel(0, 0), kMarkNan);
+  EXPECT_EQ(shown.pixel(1, 0), kMarkNan);
+  request.state.clip.near = 3;
+  EXPECT_NE(compositor.make(request, 1).a.pixel(1, 0), kMarkNan);
+  request.state.clip = {};
+  request.state.display.markNan = false;
+  EXPECT_NE(compositor.make(request, 1).a.pixel(1, 0), kMarkNan);
 }
 
 TEST(Compositor, IdentifiersAreThoseSeenMost) {
