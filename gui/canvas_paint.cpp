@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gui/canvas.h"
+#include "gui/legend.h"
 #include "gui/pixel_values.h"
 
 namespace fathom::gui {
@@ -67,6 +68,7 @@ void Canvas::paintEvent(QPaintEvent*) {
   }
   for (const Pane& pane : panes()) paintPane(painter, pane);
   painter.setRenderHint(QPainter::Antialiasing);
+  paintLegend(painter, rect(), shown_);
   const Comparison shown = comparison();
   if (shown == Comparison::Wipe) paintWipe(painter);
   if (shown == Comparison::Wipe || shown == Comparison::SideBySide) {

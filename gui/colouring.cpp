@@ -10,7 +10,6 @@
 #include "flat/colour_scale.h"
 #include "flat/error.h"
 #include "flat/finite.h"
-#include "flat/heatmap.h"
 #include "flat/metrics.h"
 #include "flat/parallel.h"
 
@@ -22,22 +21,10 @@ using Kind = Layer::Kind;
 using Colour = std::array<float, 3>;
 
 constexpr QRgb kBlack = 0xff000000;
-constexpr float kTold = 0.01f;  // differences above this are far enough from 0 to be told apart by their logarithm
 
 QRgb pack(const Colour& c) {
   const auto byte = [](float v) { return int(std::lround(255 * std::clamp(v, 0.0f, 1.0f))); };
   return qRgb(byte(c[0]), byte(c[1]), byte(c[2]));
-}
-
-// A scale's colours at even steps of t in [0,1].
-template <class Scale>
-std::vector<QRgb> table(const Scale& scale) {
-  std::vector<QRgb> colours(1024);
-  for (size_t i = 0; i < colours.size(); ++i) colours[i] = pack(scale(float(i) / float(colours.size() - 1)));
-  return colours;
-}
-QRgb lookUp(const std::vector<QRgb>& colours, float t) {
-  return colours[size_t(std::lround(std::clamp(t, 0.0f, 1.0f) * float(colours.size() - 1)))];
 }
 
 // row(index of its first pixel, its pixels to be) for every row, in parallel.
@@ -148,25 +135,31 @@ float numberOf(const Seen& seen, size_t i) {
 QImage colourNumbers(const Seen& seen, const ViewState& state, const ValueRange& range) {
   const DisplayParams& params = state.display;
   const Kind kind = seen.layer.kind;
-  const auto colours = table([&](float t) { return flat::evenColour(kind == Kind::Depth ? 1 - t : t); });
-  const float low = params.low != params.high ? params.low : range.low;
-  const float high = params.low != params.high ? params.high : range.high;
-  const float scale = high != low ? 1 / (high - low) : 0;
+  const Scale colours = numberScale(kind);
+  const ValueRange ends = endsOf(state, range);
+  const float scale = ends.high != ends.low ? 1 / (ends.high - ends.low) : 0;
   const float gain = kind == Kind::Scalar || kind == Kind::Variance ? std::exp2(params.exposure) : 1;
   return makePixels(seen, [&](size_t i) {
     const float value = numberOf(seen, i);
     const bool wrong = isSpoiled(seen, i) || std::isnan(value) || (std::isinf(value) && kind != Kind::Depth);
     if (wrong && params.markNan) return kMarkNan;
     const bool nothing = !std::isfinite(value) || (kind == Kind::Count ? value == 0 : !covers(seen, i));
-    return nothing ? kBlack : lookUp(colours, (value * gain - low) * scale);
+    return nothing ? kBlack : lookUp(colours, (value * gain - ends.low) * scale);
   });
 }
 
+// Whether the channels that are looked at have the same names; one of the two may lack A.
+bool areAlike(const Layer& a, const Layer& b) {
+  const auto colours = [](const Layer& layer) {
+    return std::span(layer.channels).first(std::min<size_t>(3, layer.channels.size()));
+  };
+  return a.kind == b.kind && std::ranges::equal(colours(a), colours(b));
+}
+
 void checkAlike(const Seen& a, const Seen& b) {
-  const std::string& name = a.layer.name;
-  if (!a.ids.empty() || !b.ids.empty()) fail("layer {}: identifiers have no difference", name);
-  if (a.values.size() != b.values.size() || a.width != b.width || a.height != b.height)
-    fail("layer {}: expected in both pictures, found {} in the other", name, b.layer.name);
+  if (!a.ids.empty() || !b.ids.empty()) fail("layer {}: identifiers have no difference", a.layer.name);
+  if (!areAlike(a.layer, b.layer))
+    fail("layer {}: expected in both pictures, found {} in the other", a.layer.name, b.layer.name);
 }
 
 // The channels as metrics take them, by the names R, G and B.
@@ -218,25 +211,24 @@ float signedDifference(const Seen& a, const Seen& b, Isolate isolate, size_t ind
 
 QImage colourDifference(const Seen& a, const Seen& b, const ViewState& state) {
   checkAlike(a, b);
-  const auto colours = table([](float t) { return flat::signedColour(2 * t - 1); });
-  const float gain = std::exp2(state.display.exposure) / kTold, most = std::asinh(1 / kTold);
+  const Scale colours = differenceScale();
+  const float gain = std::exp2(state.display.exposure);
   return makePixels(a, [&](size_t i) {
     const float value = signedDifference(a, b, state.isolate, i);
     if (!std::isfinite(value)) return state.display.markNan ? kMarkNan : kBlack;
-    return lookUp(colours, 0.5f + 0.5f * std::asinh(value * gain) / most);
+    return lookUp(colours, differencePlace(value * gain));
   });
 }
 
 QImage colourRelativeError(const Seen& a, const Seen& b, const ViewState& state) {
   checkAlike(a, b);
   const flat::Plane errors = flat::relativeError(asColour(a, state.isolate), asColour(b, state.isolate));
-  const auto colours = table(flat::heatColour);
-  const float gain = std::exp2(state.display.exposure) / flat::kHeatmapLow;
-  const float scale = 1 / std::log(flat::kHeatmapHigh / flat::kHeatmapLow);
+  const Scale colours = errorScale();
+  const float gain = std::exp2(state.display.exposure);
   return makePixels(a, [&](size_t i) {
     const float error = errors.values[i];
     if (std::isnan(error)) return state.display.markNan ? kMarkNan : kBlack;
-    return lookUp(colours, std::log(error * gain) * scale);
+    return lookUp(colours, errorPlace(error * gain));
   });
 }
 

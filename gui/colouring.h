@@ -4,6 +4,7 @@
 #include <QImage>
 
 #include "gui/display.h"
+#include "gui/false_colours.h"
 #include "gui/seen.h"
 #include "gui/view_state.h"
 
@@ -11,11 +12,6 @@ namespace fathom::gui {
 
 // What marks a pixel, whatever is shown: nothing else is as loud.
 inline constexpr QRgb kMarkNan = 0xffff00ff, kMarkAbove = 0xffff2020, kMarkBelow = 0xff2040ff;
-
-// The ends of a scale of false colours.
-struct ValueRange {
-  float low = 0, high = 1;
-};
 
 // Between which nearly all of the values lie that the layer covers: without the hundredth at either end of depths, from
 // 0 for what has no negative values. Identifiers and colours have none to speak of: [0, 1].

@@ -198,5 +198,21 @@ TEST(Colouring, DifferencesHaveASignAndErrorsDoNot) {
   EXPECT_THROW(colourDifference(a, makeSeen(Layer::Kind::Depth, {{1, 2, 3}}), {}), Error);
 }
 
+TEST(FalseColours, SayWhatTheyMean) {
+  ViewState state;
+  const Layer depth{"Z", {"Z"}, Layer::Kind::Depth};
+  FalseColours colours = falseColours(depth, state, Comparison::A, {2, 6});
+  ASSERT_EQ(colours.ticks.size(), 3u);
+  EXPECT_EQ(colours.ticks[1], std::pair(0.5, QString("4")));
+  state.display.low = 1;
+  state.display.high = 3;
+  EXPECT_EQ(falseColours(depth, state, Comparison::A, {2, 6}).ticks[2].second, "3");
+  state.display.exposure = 1;
+  colours = falseColours(depth, state, Comparison::RelativeError, {});
+  EXPECT_EQ(colours.ticks.front(), std::pair(0.0, QString("0.5 %")));
+  EXPECT_NEAR(colours.ticks.back().first, 1, 1e-6);
+  EXPECT_TRUE(falseColours({"RGBA", {"R"}, Layer::Kind::Colour}, state, Comparison::A, {}).scale.empty());
+}
+
 }  // namespace
 }  // namespace fathom::gui
