@@ -9,6 +9,7 @@
 #include <QSettings>
 #include <QStatusBar>
 #include <QVBoxLayout>
+#include <array>
 
 #include "gui/compare_panel.h"
 #include "gui/depth_panel.h"
@@ -23,6 +24,13 @@
 namespace fathom::gui {
 
 namespace {
+
+// What is kept between runs.
+constexpr std::array<std::pair<const char*, std::string DisplayParams::*>, 3> kKeptChoices = {{
+    {"display", &DisplayParams::display},
+    {"view", &DisplayParams::view},
+    {"look", &DisplayParams::look},
+}};
 
 // What the title says of a picture: what it is, and how much of it.
 QString describe(const Picture& picture) {
@@ -56,6 +64,9 @@ void MainWindow::restore() {
   const QSettings settings;
   restoreGeometry(settings.value("geometry").toByteArray());
   restoreState(settings.value("state").toByteArray());
+  ViewState view = session_.view();
+  for (const auto& [key, member] : kKeptChoices) view.display.*member = settings.value(key).toString().toStdString();
+  session_.setView(view);
 }
 
 void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
@@ -80,6 +91,8 @@ void MainWindow::closeEvent(QCloseEvent* event) {
   QSettings settings;
   settings.setValue("geometry", saveGeometry());
   settings.setValue("state", saveState());
+  for (const auto& [key, member] : kKeptChoices)
+    settings.setValue(key, QString::fromStdString(session_.view().display.*member));
   QMainWindow::closeEvent(event);
 }
 

@@ -35,7 +35,7 @@ class MainWindow : public QMainWindow {
 
   // Brings a panel to the front: "inspector", "compare", "place", "depth".
   void showPanel(const QString& name);
-  // Places of the panels as they were when the last window was closed.
+  // Places of the panels and the choice of display as they were when the last window was closed.
   void restore();
 
  protected:

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <QDockWidget>
+#include <QFileInfo>
 #include <QLabel>
 #include <QMenuBar>
 #include <QStatusBar>
@@ -11,6 +13,7 @@
 
 #include "gui/canvas.h"
 #include "gui/key_sheet.h"
+#include "gui/recent_files.h"
 
 namespace fathom::gui {
 namespace {
@@ -86,6 +89,24 @@ TEST_F(MainWindowTest, SpaceTogglesAAndB) {
   EXPECT_EQ(view().comparison, Comparison::A);
   press(Qt::Key_W);
   EXPECT_EQ(view().comparison, Comparison::Wipe);
+}
+
+TEST_F(MainWindowTest, ANewWindowLooksLikeTheLastOne) {
+  ViewState changed = view();
+  changed.display.display = "Rec.1886 / Rec.709";
+  window_.session().setView(changed);
+  window_.findChild<QDockWidget*>("depth")->hide();
+  window_.close();
+  MainWindow next;
+  next.restore();
+  EXPECT_EQ(next.session().view().display.display, changed.display.display);
+  EXPECT_TRUE(next.findChild<QDockWidget*>("depth")->isHidden());
+  EXPECT_FALSE(next.findChild<QDockWidget*>("inspector")->isHidden());
+}
+
+TEST_F(MainWindowTest, FilesOpenedLastAreInTheMenu) {
+  const QString pattern = QFileInfo(FATHOM_DEMO "/sequence.####.deep.exr").absoluteFilePath();
+  EXPECT_EQ(window_.findChild<RecentFiles*>()->files().value(0), pattern);
 }
 
 // One key, one meaning; and the sheet has them all.
