@@ -46,7 +46,7 @@ Canvas::Canvas(Session& session, std::shared_ptr<const Display> display, QWidget
   setAttribute(Qt::WA_OpaquePaintEvent);
   setMinimumSize(120, 80);
   connect(&renderer_, &Renderer::rendered, this, &Canvas::accept);
-  connect(&renderer_, &Renderer::failed, &session_, &Session::say);
+  connect(&renderer_, &Renderer::failed, this, &Canvas::refuse);
   connect(&session_, &Session::picturesChanged, this, &Canvas::follow);
   connect(&session_, &Session::viewChanged, this, &Canvas::follow);
   connect(&session_, &Session::pixelChanged, this, [this] { update(); });
@@ -156,6 +156,13 @@ void Canvas::accept(const Rendered& result) {
   shown_ = result;
   update();
   if (isCurrent()) emit updated();
+}
+
+// A picture that cannot be shown leaves nothing on the screen, rather than the one before it.
+void Canvas::refuse(const QString& reason) {
+  if (shown_.request.a != session_.a() || shown_.request.b != session_.b()) shown_ = {};
+  update();
+  session_.say(reason);
 }
 
 void Canvas::point(QPointF widget) {

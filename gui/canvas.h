@@ -73,6 +73,7 @@ class Canvas : public QWidget {
   void follow();
   void request();
   void accept(const Rendered& result);
+  void refuse(const QString& reason);
   void point(QPointF widget);
   void cutAt(QPoint pixel);
   void dragBox(QPointF to);

@@ -8,6 +8,7 @@
 #include <QMimeData>
 #include <QSettings>
 #include <QStatusBar>
+#include <QToolBar>
 #include <QVBoxLayout>
 #include <array>
 
@@ -51,6 +52,14 @@ MainWindow::MainWindow(QWidget* parent) : QMainWindow(parent) {
   addMenus();
   connect(&session_, &Session::picturesChanged, this, &MainWindow::follow);
   follow();
+}
+
+// The widgets refer to the models, which as members go before what Qt deletes by itself.
+MainWindow::~MainWindow() {
+  qDeleteAll(findChildren<QDockWidget*>());
+  qDeleteAll(findChildren<QToolBar*>(QString(), Qt::FindDirectChildrenOnly));
+  delete statusBar();
+  delete centralWidget();
 }
 
 void MainWindow::showPanel(const QString& name) {

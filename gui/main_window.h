@@ -25,6 +25,7 @@ class MainWindow : public QMainWindow {
 
  public:
   explicit MainWindow(QWidget* parent = nullptr);
+  ~MainWindow() override;
 
   Session& session() { return session_; }
   Frames& frames() { return frames_; }

@@ -208,6 +208,20 @@ TEST_F(CanvasTest, ValuesAreWrittenIntoLargePixels) {
   EXPECT_GT(colours(), 3);
 }
 
+TEST_F(CanvasTest, APictureThatCannotBeShownLeavesNoOtherOnTheScreen) {
+  QStringList said;
+  QObject::connect(&session, &Session::said, &canvas, [&](const QString& line) { said << line; });
+  deep::DeepImage image = session.a()->deep()->copy();
+  image.erase("Z");
+  session.setA(gui::makePicture("broken.exr", std::move(image)));
+  ASSERT_TRUE(QTest::qWaitFor([&] { return !said.isEmpty(); }, 20000));
+  EXPECT_TRUE(canvas.shown().a.isNull());
+  EXPECT_LT(qRed(shownAt(at(4, 3))), 20);
+  session.setA(makePicture());
+  ASSERT_TRUE(settle());
+  EXPECT_GT(qRed(shownAt(at(4, 3))), 100);
+}
+
 TEST_F(CanvasTest, WithoutPicturesNothingIsShown) {
   session.setA(nullptr);
   EXPECT_TRUE(canvas.isCurrent());

@@ -6,9 +6,13 @@
 #include <QDockWidget>
 #include <QFileInfo>
 #include <QLabel>
+#include <QLineEdit>
 #include <QMenuBar>
+#include <QPointer>
 #include <QStatusBar>
+#include <QToolBar>
 #include <QtTest>
+#include <algorithm>
 #include <map>
 
 #include "gui/canvas.h"
@@ -107,6 +111,27 @@ TEST_F(MainWindowTest, ANewWindowLooksLikeTheLastOne) {
 TEST_F(MainWindowTest, FilesOpenedLastAreInTheMenu) {
   const QString pattern = QFileInfo(FATHOM_DEMO "/sequence.####.deep.exr").absoluteFilePath();
   EXPECT_EQ(window_.findChild<RecentFiles*>()->files().value(0), pattern);
+}
+
+// With a number half typed, a picture on its way to the screen, and another one from the disk.
+TEST(MainWindow, ItsWidgetsGoBeforeWhatTheyReferTo) {
+  auto* window = new MainWindow;
+  window->show();
+  window->activateWindow();
+  window->frames().open(FATHOM_DEMO "/sequence.####.deep.exr");
+  ASSERT_TRUE(QTest::qWaitFor([&] { return window->session().a() != nullptr; }, 20000));
+  auto* field = window->findChild<QDockWidget*>("depth")->findChild<QLineEdit*>();
+  field->setFocus();
+  QTest::keyClicks(field, "2.5");
+  window->frames().openB(FATHOM_DEMO "/sequence.####.ref.exr");
+  QList<QPointer<QObject>> users = {&window->canvas()};
+  for (auto* dock : window->findChildren<QDockWidget*>()) users << dock->widget();
+  for (auto* bar : window->findChildren<QToolBar*>()) users << bar;
+  const auto left = [&] { return std::ranges::count_if(users, [](const auto& user) { return !user.isNull(); }); };
+  ASSERT_GE(left(), 6);
+  QObject::connect(&window->placement(), &QObject::destroyed, [&] { EXPECT_EQ(left(), 0); });  // the first to go
+  delete window;
+  EXPECT_EQ(left(), 0);
 }
 
 // One key, one meaning; and the sheet has them all.
