@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <span>
 #include <vector>
 
@@ -18,14 +17,8 @@ namespace fathom::gui {
 namespace {
 
 using Kind = Layer::Kind;
-using Colour = std::array<float, 3>;
 
 constexpr QRgb kBlack = 0xff000000;
-
-QRgb pack(const Colour& c) {
-  const auto byte = [](float v) { return int(std::lround(255 * std::clamp(v, 0.0f, 1.0f))); };
-  return qRgb(byte(c[0]), byte(c[1]), byte(c[2]));
-}
 
 // row(index of its first pixel, its pixels to be) for every row, in parallel.
 template <class Row>
@@ -55,71 +48,79 @@ bool isSpoiled(const Seen& seen, size_t i) {
   return !seen.spoiled.empty() && seen.spoiled[i] != 0;
 }
 
-// The channels that are looked at: one that is isolated where there are three, or else all.
-std::vector<size_t> chosen(const Seen& seen, Isolate isolate) {
-  std::vector<size_t> all(seen.values.size());
-  std::iota(all.begin(), all.end(), size_t(0));
-  const bool one = isolate == Isolate::Red || isolate == Isolate::Green || isolate == Isolate::Blue;
-  return one && all.size() == 3 ? std::vector{size_t(isolate) - size_t(Isolate::Red)} : all;
+// What three channels of light `count` pixels have from `first` on: one three times where it is isolated, or where the
+// layer has no more. `made` takes the numbers of what is no channel.
+using Light = std::array<const float*, 3>;
+Light lightOf(const Seen& seen, Isolate isolate, size_t first, size_t count, std::vector<float>& made) {
+  const auto channel = [&](size_t c) { return seen.values[std::min(c, seen.values.size() - 1)].data() + first; };
+  const Light all = {channel(0), channel(1), channel(2)};
+  const auto three = [](const float* one) { return Light{one, one, one}; };
+  if (isolate == Isolate::All) return all;
+  if (isolate == Isolate::Alpha && !seen.alpha.empty()) return three(seen.alpha.data() + first);
+  if (isolate != Isolate::Alpha && isolate != Isolate::Luminance)
+    return three(all[size_t(isolate) - size_t(Isolate::Red)]);
+  made.assign(count, 1.0f);
+  if (isolate == Isolate::Luminance)
+    for (size_t i = 0; i < count; ++i) made[i] = 0.2126f * all[0][i] + 0.7152f * all[1][i] + 0.0722f * all[2][i];
+  return three(made.data());
 }
 
-// Scene-linear light of pixel i: grey where a channel is isolated.
-Colour lightOf(const Seen& seen, Isolate isolate, size_t i) {
-  const auto value = [&](size_t c) { return seen.values[std::min(c, seen.values.size() - 1)][i]; };
-  const Colour rgb = {value(0), value(1), value(2)};
-  if (isolate == Isolate::All) return rgb;
-  if (isolate == Isolate::Luminance) {
-    const float luminance = 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
-    return {luminance, luminance, luminance};
+// As RGBA pixels: value * gain + half the alpha of `base`, which may be null.
+void pack(const Light& light, size_t count, float gain, const float* base, std::vector<float>& rgba) {
+  constexpr float kMost = 65504;
+  rgba.resize(4 * count);
+  for (size_t x = 0; x < count; ++x) {
+    for (size_t c = 0; c < 3; ++c)
+      rgba[4 * x + c] = std::clamp(finiteOrZero(light[c][x]) * gain + (base ? 0.5f * base[x] : 0.0f), -kMost, kMost);
+    rgba[4 * x + 3] = 1;
   }
-  if (isolate == Isolate::Alpha) {
-    const float alpha = seen.alpha.empty() ? 1 : seen.alpha[i];
-    return {alpha, alpha, alpha};
-  }
-  const float one = rgb[size_t(isolate) - size_t(Isolate::Red)];
-  return {one, one, one};
 }
 
-// Which values are marked.
-struct Marks {
-  bool clipped, nan;
-};
-
-QRgb marked(const Colour& value, float gain, const Marks& marks, QRgb otherwise) {
-  const auto [low, high] = std::minmax({value[0], value[1], value[2]});
-  const bool finite = std::isfinite(value[0]) && std::isfinite(value[1]) && std::isfinite(value[2]);
-  if (!finite) return marks.nan ? kMarkNan : otherwise;
-  if (marks.clipped && high * gain > 1) return kMarkAbove;
-  if (marks.clipped && low * gain < 0) return kMarkBelow;
-  return otherwise;
+// What is no number, and what leaves [0,1] once it is multiplied by `gain`.
+void mark(const Light& light, size_t count, float gain, const DisplayParams& params, QRgb* to) {
+  for (size_t x = 0; x < count; ++x) {
+    const float r = light[0][x], g = light[1][x], b = light[2][x];
+    if (!(std::isfinite(r) && std::isfinite(g) && std::isfinite(b))) {
+      if (params.markNan) to[x] = kMarkNan;
+    } else if (params.markClipped) {
+      if (std::min({r, g, b}) * gain < 0) to[x] = kMarkBelow;
+      if (std::max({r, g, b}) * gain > 1) to[x] = kMarkAbove;
+    }
+  }
 }
 
 // Light, A and vectors: everything that is three numbers to the screen.
 QImage colourLight(const Seen& seen, const ViewState& state, const Display& display) {
-  const DisplayParams& params = state.display;
+  DisplayParams params = state.display;
   const bool vector = seen.layer.kind == Kind::Vector && state.isolate != Isolate::Alpha;
   const bool data = vector || state.isolate == Isolate::Alpha;
   const RowTransform transform = data ? display.plainTransform(params.gamma) : display.transform(params);
-  const Marks marks{params.markClipped && !vector, params.markNan};
+  if (vector) params.markClipped = false;
   const float gain = std::exp2(params.exposure);
+  const size_t width = size_t(seen.width);
+  const std::vector<float> covered(width, 1.0f);
   return makeRows(seen, [&](size_t first, QRgb* to) {
-    thread_local std::vector<float> rgba;
-    rgba.resize(4 * size_t(seen.width));
-    for (size_t x = 0; x < size_t(seen.width); ++x) {
-      const Colour light = lightOf(seen, state.isolate, first + x);
-      const float half = !vector ? 0 : seen.alpha.empty() ? 0.5f : 0.5f * seen.alpha[first + x];
-      for (size_t c = 0; c < 3; ++c)
-        rgba[4 * x + c] =
-            std::clamp(finiteOrZero(light[c] * gain) * (vector ? 0.5f : 1.0f) + half, -65504.0f, 65504.0f);
-      rgba[4 * x + 3] = 1;
-    }
+    thread_local std::vector<float> made, rgba;
+    const Light light = lightOf(seen, state.isolate, first, width, made);
+    const float* alpha = seen.alpha.empty() ? covered.data() : seen.alpha.data() + first;
+    pack(light, width, vector ? gain / 2 : gain, vector ? alpha : nullptr, rgba);
     transform(rgba.data(), seen.width, to);
-    if (!marks.clipped && !marks.nan) return;
-    for (int x = 0; x < seen.width; ++x) {
-      if (isSpoiled(seen, first + size_t(x)) && marks.nan)
-        to[x] = kMarkNan;
-      else
-        to[x] = marked(lightOf(seen, state.isolate, first + size_t(x)), gain, marks, to[x]);
+    if (params.markClipped || params.markNan) mark(light, width, gain, params, to);
+    if (!seen.spoiled.empty() && params.markNan)
+      for (size_t x = 0; x < width; ++x)
+        if (seen.spoiled[first + x] != 0) to[x] = kMarkNan;
+  });
+}
+
+QImage colourIdentifiers(const Seen& seen) {
+  return makeRows(seen, [&](size_t first, QRgb* to) {
+    uint32_t last = 0;
+    QRgb colour = kBlack;
+    for (size_t x = 0; x < size_t(seen.width); ++x) {
+      const uint32_t id = seen.ids[first + x];
+      if (id != last) colour = fromDisplay(flat::identifierColour(id));
+      to[x] = colour;
+      last = id;
     }
   });
 }
@@ -162,14 +163,23 @@ void checkAlike(const Seen& a, const Seen& b) {
     fail("layer {}: expected in both pictures, found {} in the other", a.layer.name, b.layer.name);
 }
 
-// The channels as metrics take them, by the names R, G and B.
+// What is looked at as metrics take it, by the names R, G and B.
 flat::Image asColour(const Seen& seen, Isolate isolate) {
   const Box window{0, 0, seen.width, seen.height};
   flat::Image image{window, window, {}, {}};
-  const std::vector<size_t> channels = chosen(seen, isolate);
+  std::vector<float> made;
+  const Light light = lightOf(seen, isolate, 0, seen.pixels(), made);
   for (size_t c = 0; c < 3; ++c)
-    image.planes.push_back({std::string(1, "RGB"[c]), seen.values[channels[std::min(c, channels.size() - 1)]].copy()});
+    std::copy_n(light[c], seen.pixels(), image.add(std::string(1, "RGB"[c])).values.data());
   return image;
+}
+
+// The difference of the channel that differs most; NaN where one does.
+float largestDifference(const Light& a, const Light& b, size_t x) {
+  float largest = a[0][x] - b[0][x];
+  for (size_t c = 1; c < 3; ++c)
+    if (const float d = a[c][x] - b[c][x]; !(std::abs(d) <= std::abs(largest))) largest = d;
+  return largest;
 }
 
 }  // namespace
@@ -192,31 +202,29 @@ ValueRange rangeOf(const Seen& seen) {
 }
 
 QImage colour(const Seen& seen, const ViewState& state, const ValueRange& range, const Display& display) {
-  if (!seen.ids.empty()) return makePixels(seen, [&](size_t i) { return pack(flat::identifierColour(seen.ids[i])); });
+  if (!seen.ids.empty()) return colourIdentifiers(seen);
   const Kind kind = seen.layer.kind;
   if (kind == Kind::Colour || kind == Kind::Vector || (state.isolate == Isolate::Alpha && !seen.alpha.empty()))
     return colourLight(seen, state, display);
   return colourNumbers(seen, state, range);
 }
 
-float signedDifference(const Seen& a, const Seen& b, Isolate isolate, size_t index) {
-  if (isolate == Isolate::Alpha) return (a.alpha.empty() ? 1 : a.alpha[index]) - (b.alpha.empty() ? 1 : b.alpha[index]);
-  if (isolate == Isolate::Luminance && a.values.size() == 3)
-    return lightOf(a, isolate, index)[0] - lightOf(b, isolate, index)[0];
-  float largest = 0;
-  for (const size_t c : chosen(a, isolate))
-    if (const float d = a.values[c][index] - b.values[c][index]; !(std::abs(d) <= std::abs(largest))) largest = d;
-  return largest;
-}
-
 QImage colourDifference(const Seen& a, const Seen& b, const ViewState& state) {
   checkAlike(a, b);
   const Scale colours = differenceScale();
   const float gain = std::exp2(state.display.exposure);
-  return makePixels(a, [&](size_t i) {
-    const float value = signedDifference(a, b, state.isolate, i);
-    if (!std::isfinite(value)) return state.display.markNan ? kMarkNan : kBlack;
-    return lookUp(colours, differencePlace(value * gain));
+  const size_t width = size_t(a.width);
+  return makeRows(a, [&](size_t first, QRgb* to) {
+    thread_local std::vector<float> madeA, madeB;
+    const Light lightA = lightOf(a, state.isolate, first, width, madeA);
+    const Light lightB = lightOf(b, state.isolate, first, width, madeB);
+    for (size_t x = 0; x < width; ++x) {
+      const float value = largestDifference(lightA, lightB, x);
+      if (std::isfinite(value))
+        to[x] = lookUp(colours, differencePlace(value * gain));
+      else
+        to[x] = state.display.markNan ? kMarkNan : kBlack;
+    }
   });
 }
 

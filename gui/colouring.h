@@ -33,7 +33,4 @@ QImage colourDifference(const Seen& a, const Seen& b, const ViewState& state);
 // flat::relativeError of A against B in the colours of flat::heatColour, on the scale of its heatmaps.
 QImage colourRelativeError(const Seen& a, const Seen& b, const ViewState& state);
 
-// What the two comparisons above show of pixel `index`, as numbers.
-float signedDifference(const Seen& a, const Seen& b, Isolate isolate, size_t index);
-
 }  // namespace fathom::gui

@@ -76,7 +76,7 @@ SeenPtr Compositor::find(const PicturePtr& picture, const RenderRequest& request
 SeenPtr Compositor::seen(const PicturePtr& picture, const RenderRequest& request, int step, const Progress& progress) {
   if (SeenPtr there = find(picture, request, step)) return there;
   const auto begin = std::chrono::steady_clock::now();
-  const auto made =
+  SeenPtr made =
       std::make_shared<const Seen>(see(*picture, request.state.layer, request.state.clip, request.box, step, progress));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   if (made->pixels() >= kMeasurable) secondsPerPixel_ = took.count() / double(made->pixels());

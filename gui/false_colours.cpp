@@ -15,11 +15,7 @@ constexpr float kTold = 0.01f;  // differences above this are told apart by thei
 template <class Colour>
 Scale makeScale(const Colour& colour) {
   Scale scale(1024);
-  for (size_t i = 0; i < scale.size(); ++i) {
-    const auto c = colour(float(i) / float(scale.size() - 1));
-    const auto byte = [](float v) { return int(std::lround(255 * std::clamp(v, 0.0f, 1.0f))); };
-    scale[i] = qRgb(byte(c[0]), byte(c[1]), byte(c[2]));
-  }
+  for (size_t i = 0; i < scale.size(); ++i) scale[i] = fromDisplay(colour(float(i) / float(scale.size() - 1)));
   return scale;
 }
 
@@ -29,13 +25,14 @@ QString number(double value) {
 
 }  // namespace
 
+QRgb fromDisplay(const std::array<float, 3>& colour) {
+  const auto byte = [](float v) { return int(std::lround(255 * std::clamp(v, 0.0f, 1.0f))); };
+  return qRgb(byte(colour[0]), byte(colour[1]), byte(colour[2]));
+}
+
 ValueRange endsOf(const ViewState& state, const ValueRange& ofPicture) {
   const DisplayParams& params = state.display;
   return params.low != params.high ? ValueRange{params.low, params.high} : ofPicture;
-}
-
-QRgb lookUp(const Scale& scale, float t) {
-  return scale[size_t(std::lround(std::clamp(t, 0.0f, 1.0f) * float(scale.size() - 1)))];
 }
 
 Scale numberScale(Layer::Kind kind) {

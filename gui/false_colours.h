@@ -3,6 +3,8 @@
 
 #include <QRgb>
 #include <QString>
+#include <algorithm>
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -19,9 +21,15 @@ struct ValueRange {
 // Those of the state, or `ofPicture` where those are equal.
 ValueRange endsOf(const ViewState& state, const ValueRange& ofPicture);
 
+// From display values in [0,1].
+QRgb fromDisplay(const std::array<float, 3>& colour);
+
 // Colours at even steps of t in [0,1], and the one at t, brought into that.
 using Scale = std::vector<QRgb>;
-QRgb lookUp(const Scale& scale, float t);
+inline QRgb lookUp(const Scale& scale, float t) {
+  const float inside = std::min(std::max(0.0f, t), 1.0f);  // NaN is 0
+  return scale[size_t(inside * float(scale.size() - 1) + 0.5f)];
+}
 Scale numberScale(Layer::Kind kind);  // depths run from light to dark, all else from dark to light
 Scale differenceScale();              // from -1 over 0 to 1
 Scale errorScale();

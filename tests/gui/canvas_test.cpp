@@ -222,6 +222,31 @@ TEST_F(CanvasTest, APictureThatCannotBeShownLeavesNoOtherOnTheScreen) {
   EXPECT_GT(qRed(shownAt(at(4, 3))), 100);
 }
 
+TEST_F(CanvasTest, OfAVeryLargePictureOnlyWhatIsSeenAndItsSurroundingsAreAskedFor) {
+  const Box window{0, 0, 4000, 3000};
+  flat::Image image{window, window, {}, {}};
+  image.add("Y", 0.5f);
+  session.setA(gui::makePicture("large.exr", std::move(image)));
+  canvas.oneToOne();
+  ASSERT_TRUE(settle());
+  const auto seen = [&] { return intersect(canvas.viewport().visible(canvas.size()), window); };
+  const auto holdsSeen = [&] { return intersect(canvas.shown().request.box, seen()) == seen(); };
+  const Box first = canvas.shown().request.box;
+  EXPECT_TRUE(holdsSeen());
+  EXPECT_LT(first.area(), window.area() / 20);
+  drag({200, 150}, {190, 145});
+  ASSERT_TRUE(settle());
+  EXPECT_EQ(canvas.shown().request.box, first);
+  drag({300, 150}, {0, 145});
+  ASSERT_TRUE(settle());
+  EXPECT_NE(canvas.shown().request.box, first);
+  EXPECT_TRUE(holdsSeen());
+  canvas.fit();
+  ASSERT_TRUE(settle());
+  EXPECT_EQ(canvas.shown().request.box, window);
+  EXPECT_GT(canvas.shown().step, 1);
+}
+
 TEST_F(CanvasTest, WithoutPicturesNothingIsShown) {
   session.setA(nullptr);
   EXPECT_TRUE(canvas.isCurrent());
