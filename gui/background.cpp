@@ -1,6 +1,5 @@
 #include "gui/background.h"
 
-#include <QMetaObject>
 #include <exception>
 #include <new>
 
@@ -18,6 +17,11 @@ QString describeException() {
   } catch (const std::exception& e) {
     return QString::fromStdString(oneLine(e.what()));
   }
+}
+
+Caller::Caller() {
+  connect(
+      this, &Caller::call, this, [](const std::function<void()>& what) { what(); }, Qt::QueuedConnection);
 }
 
 Background::Background(QObject* parent) : QObject(parent) {
@@ -54,8 +58,7 @@ void Background::start(Work work) {
       error = describeException();
     }
     work = nullptr;  // what it holds goes in this thread
-    QMetaObject::invokeMethod(
-        this, [this, generation, deliver, error] { arrived(generation, deliver, error); }, Qt::QueuedConnection);
+    emit caller_.call([this, generation, deliver, error] { arrived(generation, deliver, error); });
   });
 }
 

@@ -14,6 +14,18 @@ namespace fathom::gui {
 // The exception that is being handled, as one line.
 QString describeException();
 
+// Calls functions in the thread that it lives in, later and in the order that they come; nothing once it is gone.
+class Caller : public QObject {
+  Q_OBJECT
+
+ public:
+  Caller();
+
+ signals:
+  // Emitted from any thread.
+  void call(const std::function<void()>& what);
+};
+
 // One thing runs at a time. What waits is replaced by what comes later.
 class Background : public QObject {
   Q_OBJECT
@@ -46,6 +58,7 @@ class Background : public QObject {
   Work waiting_;
   uint64_t generation_ = 0;  // of what may still deliver
   std::stop_source stop_;
+  Caller caller_;
   QThreadPool thread_;
 };
 

@@ -4,11 +4,8 @@
 
 #include <QDir>
 #include <QFileInfo>
-#include <QMetaObject>
 #include <algorithm>
 #include <chrono>
-
-#include "gui/background.h"
 
 namespace fathom::gui {
 
@@ -162,8 +159,7 @@ void FrameCache::read(const std::string& path) {
       outcome.failure = describeException();
     }
     outcome.after = stampOf(path);
-    QMetaObject::invokeMethod(
-        this, [this, path, outcome] { arrived(path, outcome); }, Qt::QueuedConnection);
+    emit caller_.call([this, path, outcome] { arrived(path, outcome); });
   });
 }
 

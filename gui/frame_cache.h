@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "gui/background.h"
 #include "gui/picture.h"
 
 namespace fathom::gui {
@@ -97,6 +98,7 @@ class FrameCache : public QObject {
   std::string reading_;    // empty: nothing
   QFileSystemWatcher watcher_;
   QTimer settle_;  // files are looked at when they have not changed for a moment
+  Caller caller_;
   QThreadPool thread_;
 };
 

@@ -1,10 +1,7 @@
 #include "gui/jobs.h"
 
-#include <QMetaObject>
 #include <algorithm>
 #include <utility>
-
-#include "gui/background.h"
 
 namespace fathom::gui {
 
@@ -63,7 +60,7 @@ void Jobs::startNext() {
       done_ = done;
       emit progressed(done);
     };
-    QMetaObject::invokeMethod(this, tell, Qt::QueuedConnection);
+    emit caller_.call(tell);
   };
   thread_.start([this, work = std::move(job.work), progress = Progress{report, stop_.get_token()}]() mutable {
     Outcome outcome;
@@ -75,8 +72,7 @@ void Jobs::startNext() {
       outcome.error = describeException();
     }
     work = nullptr;  // what it holds goes in this thread
-    QMetaObject::invokeMethod(
-        this, [this, outcome] { arrived(outcome); }, Qt::QueuedConnection);
+    emit caller_.call([this, outcome] { arrived(outcome); });
   });
 }
 

@@ -10,6 +10,7 @@
 #include <stop_token>
 
 #include "flat/progress.h"
+#include "gui/background.h"
 
 namespace fathom::gui {
 
@@ -64,6 +65,7 @@ class Jobs : public QObject {
   QElapsedTimer since_;
   std::stop_source stop_;
   std::deque<Job> waiting_;
+  Caller caller_;
   QThreadPool thread_;
 };
 
