@@ -20,7 +20,7 @@ bool isComponent(const std::string& name) {
 deep::DeepImage onlyComponent(const deep::DeepImage& image, const std::string& component) {
   deep::DeepImage result = image.copy();
   for (const std::string channel : {"R", "G", "B"}) {
-    deep::Channel* part = result.find(component + "." + channel);
+    deep::Channel* part = result.find(fmt::format("{}.{}", component, channel));
     if (!part) fail("channel {}.{}: expected in the image, found none", component, channel);
     part->name = "part " + channel;
     result.erase(channel);
@@ -116,7 +116,7 @@ Standing standingOf(const std::string& path, const char* attribute, const std::s
 }
 
 // The image itself comes last: where it stands, the frame is complete.
-FrameSink::FrameSink(FrameOutputs outputs, FrameOrigin origin) : origin_(std::move(origin)) {
+FrameSink::FrameSink(const FrameOutputs& outputs, FrameOrigin origin) : origin_(std::move(origin)) {
   for (const auto& [name, path] : outputs.components) outputs_.push_back(std::make_unique<Output>(path, name, false));
   if (!outputs.flattened.empty()) outputs_.push_back(std::make_unique<Output>(outputs.flattened, "", true));
   outputs_.push_back(std::make_unique<Output>(outputs.image, "", false));

@@ -42,7 +42,7 @@ struct FrameOrigin {
 
 class FrameSink {
  public:
-  FrameSink(FrameOutputs outputs, FrameOrigin origin);
+  FrameSink(const FrameOutputs& outputs, FrameOrigin origin);
   FrameSink(FrameSink&&) noexcept;
   ~FrameSink();
 
