@@ -2,8 +2,8 @@
 // signal-safe.
 #include "cli/interrupt.h"
 
-#include <time.h>
 #include <unistd.h>
+#include <ctime>
 
 #include "cli/commands.h"
 
