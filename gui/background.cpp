@@ -1,5 +1,6 @@
 #include "gui/background.h"
 
+#include <CLI/Error.hpp>
 #include <exception>
 #include <new>
 
@@ -14,6 +15,8 @@ QString describeException() {
     return {};
   } catch (const std::bad_alloc&) {
     return QStringLiteral("expected more memory than there is");
+  } catch (const CLI::ValidationError& e) {  // "-o: expected ...", of a command line that is not there
+    return QString::fromStdString(oneLine(e.what())).section(": ", 1);
   } catch (const std::exception& e) {
     return QString::fromStdString(oneLine(e.what()));
   }

@@ -12,19 +12,24 @@ namespace fathom::gui {
 
 namespace {
 
-constexpr size_t kWhole = size_t(9) << 20;  // pixels up to which a picture is composited whole, seen or not
+constexpr size_t kWhole = size_t(9) << 20;  // pixels up to which a picture that is moved is composited whole
 constexpr double kWheelStep = 240;          // eighths of a degree that double the size
 constexpr double kClick = 4;                // units of the screen within which a press and its release are a click
 constexpr double kReach = 6;                // from which the wipe's line can be taken
 constexpr double kKept = 16;                // of the picture that cannot be moved out of sight
 
 Box grown(const Box& box) {
-  const int x = box.width() / 2, y = box.height() / 2;
+  const int x = box.width() / 4, y = box.height() / 4;
   return {box.x0 - x, box.y0 - y, box.x1 + x, box.y1 + y};
 }
 
 bool holds(const Box& outer, const Box& inner) {
   return intersect(outer, inner) == inner;
+}
+
+// But for where, how bright and beside what: planes of the one are of use to the other.
+bool showSame(const RenderRequest& a, const RenderRequest& b) {
+  return a.a == b.a && a.b == b.b && a.state.layer == b.state.layer && a.state.clip == b.state.clip;
 }
 
 int powerOfTwoUpTo(double value) {
@@ -97,10 +102,11 @@ RenderRequest Canvas::wanted() const {
   const int coarse = powerOfTwoUpTo(1 / zoom());
   while (request.step < coarse && seen.area() / size_t(request.step * request.step) > kWhole) request.step *= 2;
   request.shrink = coarse / request.step;
+  const bool same = showSame(request, asked_);
   const bool stillThere = request.step == asked_.step && holds(all, asked_.box) && holds(asked_.box, seen);
-  request.box = all.area() <= kWhole                ? all
-                : stillThere && !asked_.box.empty() ? asked_.box
-                                                    : intersect(grown(seen), all);
+  request.box = same && stillThere && !asked_.box.empty()        ? asked_.box
+                : seen.empty() || (same && all.area() <= kWhole) ? all
+                                                                 : intersect(grown(seen), all);
   return request;
 }
 

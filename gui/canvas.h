@@ -26,6 +26,8 @@ class Canvas : public QWidget {
   // Units of the screen's own pixels per pixel of the picture.
   double zoom() const { return viewport_.scale * devicePixelRatioF(); }
   double wipe() const { return wipe_; }
+  // The picture's column that the wipe's line is at.
+  double wipeColumn() const { return viewport_.toPicture({wipe_ * width(), 0}).x(); }
   const Rendered& shown() const { return shown_; }
   // False while an answer to what is asked for has not come yet.
   bool isCurrent() const;

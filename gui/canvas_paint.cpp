@@ -93,7 +93,7 @@ void Canvas::paintPane(QPainter& painter, const Pane& pane) const {
   const auto paint = [&](bool b, const QRectF& part) {
     const bool other = (b ? shown_.b : shown_.a).isNull();  // the answer to what is asked for has not come yet
     const QImage& image = b != other ? shown_.b : shown_.a;
-    const SeenPtr& seen = b != other ? shown_.seenB : shown_.seenA;
+    const SeenPtr& seen = shown_.compared ? shown_.compared : b != other ? shown_.seenB : shown_.seenA;
     if (image.isNull()) return;
     painter.setClipRect(part);
     paintImage(painter, viewport, part, image, shown_.request.box, shown_.pixelSize);

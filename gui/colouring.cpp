@@ -182,11 +182,17 @@ float largestDifference(const Light& a, const Light& b, size_t x) {
   return largest;
 }
 
+Seen onePlane(const Seen& like, const std::string& name, Buffer<float> values) {
+  Seen seen{{name, {name}, Kind::Scalar}, like.box, like.step, like.width, like.height};
+  seen.values.push_back(std::move(values));
+  return seen;
+}
+
 }  // namespace
 
 ValueRange rangeOf(const Seen& seen) {
   const Kind kind = seen.layer.kind;
-  if (seen.values.empty() || kind == Kind::Colour || kind == Kind::Vector) return {};
+  if (!hasFalseColours(kind)) return {};
   std::vector<float> values;
   for (size_t i = 0; i < seen.pixels(); ++i)
     if (const float value = numberOf(seen, i); isFinite(value) && covers(seen, i)) values.push_back(value);
@@ -203,40 +209,45 @@ ValueRange rangeOf(const Seen& seen) {
 
 QImage colour(const Seen& seen, const ViewState& state, const ValueRange& range, const Display& display) {
   if (!seen.ids.empty()) return colourIdentifiers(seen);
-  const Kind kind = seen.layer.kind;
-  if (kind == Kind::Colour || kind == Kind::Vector || (state.isolate == Isolate::Alpha && !seen.alpha.empty()))
+  if (!hasFalseColours(seen.layer.kind) || (state.isolate == Isolate::Alpha && !seen.alpha.empty()))
     return colourLight(seen, state, display);
   return colourNumbers(seen, state, range);
 }
 
-QImage colourDifference(const Seen& a, const Seen& b, const ViewState& state) {
+Seen differenceOf(const Seen& a, const Seen& b, Isolate isolate) {
   checkAlike(a, b);
+  Seen difference = onePlane(a, "difference", Buffer<float>(a.pixels()));
+  parallelRanges(0, a.height, 8, [&](int begin, int end) {
+    const size_t width = size_t(a.width), first = size_t(begin) * width, count = size_t(end - begin) * width;
+    thread_local std::vector<float> madeA, madeB;
+    const Light lightA = lightOf(a, isolate, first, count, madeA), lightB = lightOf(b, isolate, first, count, madeB);
+    for (size_t i = 0; i < count; ++i) difference.values[0][first + i] = largestDifference(lightA, lightB, i);
+  });
+  return difference;
+}
+
+Seen relativeErrorOf(const Seen& a, const Seen& b, Isolate isolate) {
+  checkAlike(a, b);
+  return onePlane(a, "relative error", flat::relativeError(asColour(a, isolate), asColour(b, isolate)).values);
+}
+
+QImage colourDifference(const Seen& difference, const ViewState& state) {
   const Scale colours = differenceScale();
   const float gain = std::exp2(state.display.exposure);
-  const size_t width = size_t(a.width);
-  return makeRows(a, [&](size_t first, QRgb* to) {
-    thread_local std::vector<float> madeA, madeB;
-    const Light lightA = lightOf(a, state.isolate, first, width, madeA);
-    const Light lightB = lightOf(b, state.isolate, first, width, madeB);
-    for (size_t x = 0; x < width; ++x) {
-      const float value = largestDifference(lightA, lightB, x);
-      if (std::isfinite(value))
-        to[x] = lookUp(colours, differencePlace(value * gain));
-      else
-        to[x] = state.display.markNan ? kMarkNan : kBlack;
-    }
+  return makePixels(difference, [&](size_t i) {
+    const float value = difference.values[0][i];
+    if (!std::isfinite(value)) return state.display.markNan ? kMarkNan : kBlack;
+    return lookUp(colours, differencePlace(value * gain));
   });
 }
 
-QImage colourRelativeError(const Seen& a, const Seen& b, const ViewState& state) {
-  checkAlike(a, b);
-  const flat::Plane errors = flat::relativeError(asColour(a, state.isolate), asColour(b, state.isolate));
+QImage colourRelativeError(const Seen& error, const ViewState& state) {
   const Scale colours = errorScale();
   const float gain = std::exp2(state.display.exposure);
-  return makePixels(a, [&](size_t i) {
-    const float error = errors.values[i];
-    if (std::isnan(error)) return state.display.markNan ? kMarkNan : kBlack;
-    return lookUp(colours, errorPlace(error * gain));
+  return makePixels(error, [&](size_t i) {
+    const float value = error.values[0][i];
+    if (std::isnan(value)) return state.display.markNan ? kMarkNan : kBlack;
+    return lookUp(colours, errorPlace(value * gain));
   });
 }
 

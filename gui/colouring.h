@@ -26,11 +26,15 @@ ValueRange rangeOf(const Seen& seen);
 // - Identifiers have a colour each.
 QImage colour(const Seen& seen, const ViewState& state, const ValueRange& range, const Display& display);
 
-// A - B of the channel that differs most, or of the one that is looked at: signedColour, grown by exposure, on a scale
-// that tells small ones apart, too (asinh). The windows and channels must be the same.
-QImage colourDifference(const Seen& a, const Seen& b, const ViewState& state);
+// One plane: A - B of the channel that differs most, or of the one that is looked at. The windows and channels must be
+// the same.
+Seen differenceOf(const Seen& a, const Seen& b, Isolate isolate);
+// One plane: flat::relativeError of A against B.
+Seen relativeErrorOf(const Seen& a, const Seen& b, Isolate isolate);
 
-// flat::relativeError of A against B in the colours of flat::heatColour, on the scale of its heatmaps.
-QImage colourRelativeError(const Seen& a, const Seen& b, const ViewState& state);
+// The first by signedColour, grown by exposure, on a scale that tells small ones apart, too (asinh); the second in the
+// colours of flat::heatColour, on the scale of its heatmaps.
+QImage colourDifference(const Seen& difference, const ViewState& state);
+QImage colourRelativeError(const Seen& error, const ViewState& state);
 
 }  // namespace fathom::gui

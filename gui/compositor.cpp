@@ -89,13 +89,15 @@ SeenPtr Compositor::seen(const PicturePtr& picture, const RenderRequest& request
   return made;
 }
 
-ValueRange Compositor::range(const PicturePtr& picture, const std::string& layer) {
+ValueRange Compositor::range(const PicturePtr& picture, const std::string& layer, const Progress& progress) {
+  const Layer* of = picture->layer(layer);
+  if (of && !hasFalseColours(of->kind)) return {};
   std::erase_if(ranges_, [](const KeptRange& kept) { return kept.picture.expired(); });
   for (const KeptRange& kept : ranges_)
     if (kept.picture.lock() == picture && kept.layer == layer) return kept.range;
   const Box& window = picture->dataWindow();
   const int step = 1 + int(std::sqrt(double(window.area()) / double(kPixelsOfRange)));
-  const ValueRange range = rangeOf(see(*picture, layer, {}, window, step));
+  const ValueRange range = rangeOf(see(*picture, layer, {}, window, step, progress));
   ranges_.push_back({picture, layer, range});
   return range;
 }
@@ -116,12 +118,14 @@ Rendered Compositor::make(const RenderRequest& request, int step, const Progress
   if (showsA(comparison)) made.seenA = seen(request.a, request, step, progress);
   if (showsB(comparison)) made.seenB = seen(request.b, request, step, progress);
   if (comparison == Comparison::Difference) {
-    made.a = colourDifference(*made.seenA, *made.seenB, request.state);
+    made.compared = std::make_shared<const Seen>(differenceOf(*made.seenA, *made.seenB, request.state.isolate));
+    made.a = colourDifference(*made.compared, request.state);
   } else if (comparison == Comparison::RelativeError) {
-    made.a = colourRelativeError(*made.seenA, *made.seenB, request.state);
+    made.compared = std::make_shared<const Seen>(relativeErrorOf(*made.seenA, *made.seenB, request.state.isolate));
+    made.a = colourRelativeError(*made.compared, request.state);
   } else {
     // B's false colours mean the same as A's.
-    made.ends = range(request.a ? request.a : request.b, request.state.layer);
+    made.ends = range(request.a ? request.a : request.b, request.state.layer, progress);
     if (made.seenA) made.a = colour(*made.seenA, request.state, made.ends, *display_);
     if (made.seenB) made.b = colour(*made.seenB, request.state, made.ends, *display_);
   }
@@ -132,9 +136,16 @@ Rendered Compositor::make(const RenderRequest& request, int step, const Progress
   return made;
 }
 
-QImage joined(const Rendered& rendered) {
+QImage joined(const Rendered& rendered, double wipe) {
   const QImage &a = rendered.a, &b = rendered.b;
   if (a.isNull() || b.isNull()) return a.isNull() ? b : a;
+  if (comparisonOf(rendered.request) == Comparison::Wipe) {
+    const double line = (wipe - rendered.request.box.x0) / rendered.pixelSize;
+    const int column = int(std::lround(std::clamp(line, 0.0, double(a.width()))));
+    QImage both = a;
+    QPainter(&both).drawImage(column, 0, b, column, 0);
+    return both;
+  }
   QImage both(a.width() + b.width(), std::max(a.height(), b.height()), QImage::Format_RGB32);
   both.fill(Qt::black);
   QPainter painter(&both);

@@ -31,11 +31,12 @@ struct Rendered {
   int pixelSize = 1;     // how many pixels across of the picture each of an image's is
   QImage a, b;           // null where the comparison does not show that picture; a difference is in `a`
   SeenPtr seenA, seenB;  // what the images were made from
+  SeenPtr compared;      // the difference or error that `a` shows, or null
   ValueRange ends;       // of the false colours
 };
 
-// The one image that there is, or A and B beside one another.
-QImage joined(const Rendered& rendered);
+// The one image that there is, or A and B beside one another; of a wipe B from the picture's column `wipe` on.
+QImage joined(const Rendered& rendered, double wipe);
 
 class Compositor {
  public:
@@ -61,7 +62,7 @@ class Compositor {
 
   SeenPtr find(const PicturePtr& picture, const RenderRequest& request, int step) const;
   SeenPtr seen(const PicturePtr& picture, const RenderRequest& request, int step, const Progress& progress);
-  ValueRange range(const PicturePtr& picture, const std::string& layer);
+  ValueRange range(const PicturePtr& picture, const std::string& layer, const Progress& progress);
 
   std::shared_ptr<const Display> display_;
   std::list<Kept> kept_;  // the newest first

@@ -29,6 +29,8 @@ class DepthPanel : public QWidget {
   // Invert, animate, reset, logarithmic depth, logarithmic counts: for menus and keys.
   QList<QAction*> clipActions() const { return actions_; }
   QAction* animateAction() const { return animate_; }
+  QAction* logDepthAction() const { return logDepth_; }
+  QAction* logCountsAction() const { return logCounts_; }
 
  signals:
   // A newer histogram is shown.

@@ -30,6 +30,11 @@ QRgb fromDisplay(const std::array<float, 3>& colour) {
   return qRgb(byte(colour[0]), byte(colour[1]), byte(colour[2]));
 }
 
+bool hasFalseColours(Layer::Kind kind) {
+  using Kind = Layer::Kind;
+  return kind != Kind::Colour && kind != Kind::Vector && kind != Kind::Identifier;
+}
+
 ValueRange endsOf(const ViewState& state, const ValueRange& ofPicture) {
   const DisplayParams& params = state.display;
   return params.low != params.high ? ValueRange{params.low, params.high} : ofPicture;
@@ -67,7 +72,7 @@ FalseColours falseColours(const Layer& layer, const ViewState& state, Comparison
     result.scale = errorScale();
     for (const float e : {0.01f, 0.03f, 0.1f, 0.3f, 1.0f})
       result.ticks.emplace_back(errorPlace(e), number(100 * double(e / gain)) + " %");
-  } else if (layer.kind != Kind::Colour && layer.kind != Kind::Vector && layer.kind != Kind::Identifier) {
+  } else if (hasFalseColours(layer.kind)) {
     result.scale = numberScale(layer.kind);
     const ValueRange shown = endsOf(state, ends);
     const bool grows = layer.kind == Kind::Scalar || layer.kind == Kind::Variance;

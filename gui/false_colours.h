@@ -18,6 +18,9 @@ struct ValueRange {
   float low = 0, high = 1;
 };
 
+// Whether layers of that kind are shown on a scale.
+bool hasFalseColours(Layer::Kind kind);
+
 // Those of the state, or `ofPicture` where those are equal.
 ValueRange endsOf(const ViewState& state, const ValueRange& ofPicture);
 

@@ -179,6 +179,7 @@ void FrameJobs::saveDeep(const QString& path) {
 void FrameJobs::savePng(const QString& path, const std::function<QImage()>& make) {
   addSaving(path, [make](const std::string& to) {
     const QImage image = make();
+    if (image.isNull()) fail("{}: expected pixels to save, found an empty data window", to);
     QSaveFile file(QString::fromStdString(to));
     if (!file.open(QIODevice::WriteOnly) || !image.save(&file, "PNG") || !file.commit())
       fail("{}: expected a file that can be written, found: {}", to, oneLine(file.errorString().toStdString()));

@@ -8,9 +8,6 @@
 #include "gui/theme.h"
 
 int main(int argc, char** argv) {
-  QApplication application(argc, argv);
-  QApplication::setApplicationName("fathom-view");
-  QApplication::setOrganizationName("fathom");
   CLI::App options("fathom-view: see what is inside a deep pixel");
   std::vector<std::string> files;
   size_t memory = size_t(8) << 30;
@@ -20,6 +17,16 @@ int main(int argc, char** argv) {
       .add_option("--memory", memory, "How much memory pictures may take: frames of a sequence are kept up to there")
       ->transform(CLI::AsSizeValue(false).description(""))
       ->default_str("8G");
+  // Help needs no display; all else has to wait until Qt has taken its own arguments.
+  try {
+    options.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return options.exit(e);
+  } catch (const CLI::ParseError&) {
+  }
+  QApplication application(argc, argv);
+  QApplication::setApplicationName("fathom-view");
+  QApplication::setOrganizationName("fathom");
   CLI11_PARSE(options, argc, argv);
   fathom::gui::applyTheme(application);
   fathom::gui::MainWindow window;

@@ -10,7 +10,7 @@
 #include <QStatusBar>
 #include <QToolBar>
 #include <QVBoxLayout>
-#include <array>
+#include <algorithm>
 
 #include "gui/compare_panel.h"
 #include "gui/depth_panel.h"
@@ -76,6 +76,17 @@ void MainWindow::restore() {
   ViewState view = session_.view();
   for (const auto& [key, member] : kKeptChoices) view.display.*member = settings.value(key).toString().toStdString();
   session_.setView(view);
+  for (const auto& [key, action] : keptSwitches())
+    action->setChecked(settings.value(key, action->isChecked()).toBool());
+  Player& player = frames_.player();
+  player.setFps(settings.value("fps", player.fps()).toDouble());
+  player.setRepeat(Repeat(std::clamp(settings.value("repeat").toInt(), int(Repeat::Loop), int(Repeat::Once))));
+}
+
+std::array<std::pair<QString, QAction*>, 3> MainWindow::keptSwitches() const {
+  return {{{"logDepth", depth_->logDepthAction()},
+           {"logCounts", depth_->logCountsAction()},
+           {"logSamples", inspector_->logarithmicAction()}}};
 }
 
 void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
@@ -102,6 +113,9 @@ void MainWindow::closeEvent(QCloseEvent* event) {
   settings.setValue("state", saveState());
   for (const auto& [key, member] : kKeptChoices)
     settings.setValue(key, QString::fromStdString(session_.view().display.*member));
+  for (const auto& [key, action] : keptSwitches()) settings.setValue(key, action->isChecked());
+  settings.setValue("fps", frames_.player().fps());
+  settings.setValue("repeat", int(frames_.player().repeat()));
   QMainWindow::closeEvent(event);
 }
 

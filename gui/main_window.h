@@ -3,7 +3,9 @@
 
 #include <QKeySequence>
 #include <QMainWindow>
+#include <array>
 #include <functional>
+#include <utility>
 
 #include "gui/canvas.h"
 #include "gui/display.h"
@@ -36,7 +38,7 @@ class MainWindow : public QMainWindow {
 
   // Brings a panel to the front: "inspector", "compare", "place", "depth".
   void showPanel(const QString& name);
-  // Places of the panels and the choice of display as they were when the last window was closed.
+  // Places of the panels, the choice of display, of scales and of playing as they were when the last window was closed.
   void restore();
 
  protected:
@@ -57,6 +59,7 @@ class MainWindow : public QMainWindow {
   void addProcessMenu();
   void addWindowMenu();
   void addHelpMenu();
+  std::array<std::pair<QString, QAction*>, 3> keptSwitches() const;
   QString folder() const;  // of A
   void open(const QString& title, void (Frames::*take)(const QString&));
   void save(const QString& title, const QString& suffix, const std::function<void(const QString& path)>& write);

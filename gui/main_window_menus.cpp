@@ -72,7 +72,9 @@ void MainWindow::addFileMenu() {
   addTo(menu, "Save as It Looks, as PNG…", {QKeySequence("Ctrl+P")}, this, [this] {
     save("Save as it looks", "png", [this](const QString& path) {
       const RenderRequest request{session_.a(), session_.b(), session_.view(), frameJobs_.seen()->dataWindow()};
-      frameJobs_.savePng(path, [request, display = display_] { return joined(Compositor(display).make(request, 1)); });
+      frameJobs_.savePng(path, [request, display = display_, wipe = canvas_->wipeColumn()] {
+        return joined(Compositor(display).make(request, 1), wipe);
+      });
     });
   });
   menu->addSeparator();

@@ -69,6 +69,12 @@ void addLayers(const std::string& prefix, std::vector<std::string> channels, std
     remove(vector);
     layers.push_back({prefix, vector, variance ? Kind::Variance : Kind::Vector});
   }
+  // Grey; beside an X it is a direction's or a place's.
+  const auto grey = std::ranges::find(channels, "Y", suffixOf);
+  if (grey != channels.end() && scalarKind(*grey) == Kind::Scalar && !std::ranges::count(channels, "X", suffixOf)) {
+    layers.push_back({*grey, {*grey}, Kind::Colour});
+    channels.erase(grey);
+  }
   for (const std::string& channel : channels) layers.push_back({channel, {channel}, scalarKind(channel)});
 }
 

@@ -15,7 +15,7 @@ namespace fathom::gui {
 // Channels that are looked at together.
 struct Layer {
   enum class Kind {
-    Colour,      // three channels of light or of a surface's colour, and perhaps A; through the display transform
+    Colour,      // light or a surface's colour: three channels and perhaps A, or grey; through the display transform
     Vector,      // three channels that are directions or positions: shown as v/2 + 1/2
     Depth,       // false colour, all others here too
     Scalar,      // any other single channel
@@ -24,7 +24,7 @@ struct Layer {
     Identifier,  // a UINT channel: each value has a colour of its own
   };
   std::string name;                   // "RGBA", "diffuse", "N", "Z", "samples per pixel"
-  std::vector<std::string> channels;  // in the order R G B A, X Y Z
+  std::vector<std::string> channels;  // in the order R G B A, X Y Z; grey: Y
   Kind kind;
   bool nonFinite = false;  // whether one of the values is no number, or infinite; of depths only the former counts
 };

@@ -13,7 +13,7 @@ namespace {
 
 using Kind = Layer::Kind;
 
-constexpr int kBandRows = 32;
+constexpr int kBandRows = 128;  // many of the tiles that clipView shares out
 
 // The channel that says how far the layer covers its pixels; empty: none.
 std::string alphaOf(const Picture& picture, const Layer& layer) {

@@ -208,6 +208,66 @@ TEST_F(CanvasTest, ValuesAreWrittenIntoLargePixels) {
   EXPECT_GT(colours(), 3);
 }
 
+TEST_F(CanvasTest, DifferencesAreWrittenInsteadOfWhatTheyAreOf) {
+  canvas.zoomTo(60);
+  const auto grabOfNoDifference = [&](float red) {
+    session.setA(makePicture(red));
+    session.setB(makePicture(red));
+    EXPECT_TRUE(settle());
+    return canvas.grab(canvas.viewport().toScreen(Box{9, 3, 12, 5}).toAlignedRect()).toImage();
+  };
+  for (const Comparison comparison : {Comparison::Difference, Comparison::RelativeError}) {
+    setComparison(comparison);
+    EXPECT_EQ(grabOfNoDifference(0.5f), grabOfNoDifference(0.25f));
+  }
+}
+
+TEST_F(CanvasTest, WhatChangesIsCompositedWhereItIsSeen) {
+  const Box whole = session.a()->dataWindow();
+  EXPECT_EQ(canvas.shown().request.box, whole);
+  canvas.zoomTo(60);
+  ViewState view = session.view();
+  view.clip.near = 3;
+  session.setView(view);
+  ASSERT_TRUE(settle());
+  const Box box = canvas.shown().request.box, seen = intersect(canvas.viewport().visible(canvas.size()), whole);
+  EXPECT_EQ(intersect(box, seen), seen);
+  EXPECT_LT(box.area(), whole.area());
+  drag({100, 100}, {101, 106});  // within what is there
+  EXPECT_EQ(canvas.shown().request.box, box);
+  EXPECT_TRUE(canvas.isCurrent());
+  drag({10, 10}, {390, 290});
+  ASSERT_TRUE(settle());
+  EXPECT_EQ(canvas.shown().request.box, whole);
+}
+
+// A pixel, off the origin, of a picture with any window; and B elsewhere.
+TEST_F(CanvasTest, APixelAloneAndBElsewhere) {
+  const auto pixel = [](int x, int y, const char* channel) {
+    flat::Image image{{x, y, x + 1, y + 1}, {-8, -6, 8, 6}, {}, {}};
+    image.add(channel, 0.5f);
+    return gui::makePicture("pixel.exr", std::move(image));
+  };
+  session.setA(pixel(-3, 2, "Y"));
+  session.setB(pixel(20, 2, "Y"));  // outside of the display window
+  ASSERT_TRUE(settle());
+  EXPECT_EQ(shownAt(at(-3, 2)), qRgb(188, 188, 188));
+  EXPECT_EQ(shownAt(at(2, 2)), qRgb(0, 0, 0));
+  setComparison(Comparison::B);
+  ASSERT_TRUE(settle());
+  EXPECT_EQ(shownAt(at(-3, 2)), qRgb(0, 0, 0));
+  canvas.zoomTo(2);
+  drag({390, 150}, {10, 150});
+  ASSERT_TRUE(settle());
+  session.setB(pixel(2, 2, "mask"));  // no channel of A's
+  ASSERT_TRUE(settle());
+  session.setA(nullptr);
+  session.setB(nullptr);
+  session.setB(pixel(4, 4, "mask"));
+  ASSERT_TRUE(settle());
+  EXPECT_NE(shownAt(at(4, 4)), qRgb(0, 0, 0));
+}
+
 TEST_F(CanvasTest, APictureThatCannotBeShownLeavesNoOtherOnTheScreen) {
   QStringList said;
   QObject::connect(&session, &Session::said, &canvas, [&](const QString& line) { said << line; });

@@ -182,20 +182,36 @@ TEST(Colouring, TheEndsOfAPictureLeaveOutliersOut) {
   EXPECT_NEAR(scalar.high, 2, 0.02);
 }
 
+TEST(Colouring, GreyIsLightWhateverIsIsolated) {
+  const Seen grey = makeSeen(Layer::Kind::Colour, {{0.18f, 1}}, {0.5f, 1});
+  for (const Isolate isolate : {Isolate::All, Isolate::Red, Isolate::Blue, Isolate::Luminance}) {
+    ViewState state;
+    state.isolate = isolate;
+    const QImage image = colourOf(grey, state);
+    EXPECT_NEAR(qRed(image.pixel(0, 0)), 118, 1);
+    EXPECT_EQ(image.pixel(1, 0), qRgb(255, 255, 255));
+    EXPECT_EQ(differenceOf(grey, grey, isolate).values[0][0], 0);
+    EXPECT_EQ(relativeErrorOf(grey, grey, isolate).values[0][1], 0);
+  }
+}
+
 TEST(Colouring, DifferencesHaveASignAndErrorsDoNot) {
   const Seen a = makeSeen(Layer::Kind::Colour, {{0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}});
   const Seen b = makeSeen(Layer::Kind::Colour, {{0.5f, 0.4f, 0.6f}, {0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}});
-  const QImage difference = colourDifference(a, b, {});
+  const auto showDifference = [&](const ViewState& state) {
+    return colourDifference(differenceOf(a, b, state.isolate), state);
+  };
+  const QImage difference = showDifference({});
   EXPECT_LT(qGray(difference.pixel(0, 0)), 3);
   EXPECT_GT(qRed(difference.pixel(1, 0)), qBlue(difference.pixel(1, 0)));  // A is more
   EXPECT_LT(qRed(difference.pixel(2, 0)), qBlue(difference.pixel(2, 0)));
   ViewState green;
   green.isolate = Isolate::Green;
-  EXPECT_LT(qGray(colourDifference(a, b, green).pixel(1, 0)), 3);
-  const QImage error = colourRelativeError(a, b, {});
+  EXPECT_LT(qGray(showDifference(green).pixel(1, 0)), 3);
+  const QImage error = colourRelativeError(relativeErrorOf(a, b, Isolate::All), {});
   EXPECT_EQ(error.pixel(0, 0), qRgb(0, 0, 0));
   EXPECT_GT(qGray(error.pixel(1, 0)), 60);
-  EXPECT_THROW(colourDifference(a, makeSeen(Layer::Kind::Depth, {{1, 2, 3}}), {}), Error);
+  EXPECT_THROW(differenceOf(a, makeSeen(Layer::Kind::Depth, {{1, 2, 3}}), Isolate::All), Error);
 }
 
 TEST(FalseColours, SayWhatTheyMean) {

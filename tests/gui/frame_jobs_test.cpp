@@ -94,6 +94,9 @@ TEST_F(FrameJobsTest, WhatCannotBeDenoisedIsSaid) {
   frameJobs_.denoiseFrame();
   finish();
   EXPECT_TRUE(said_.contains("channel G"));
+  frameJobs_.denoiseSequence(path("clean.jpg"));
+  finish();
+  EXPECT_TRUE(said_.startsWith("expected a name that ends in .exr")) << said_.toStdString();
   frameJobs_.denoiseSequence(path("missing/clean.exr"));
   finish();
   EXPECT_TRUE(said_.contains("missing/clean.exr"));
@@ -143,6 +146,10 @@ TEST_F(FrameJobsTest, SavesAPicture) {
   frameJobs_.savePng(path("missing/a.png"), [image] { return image; });
   finish();
   EXPECT_TRUE(said_.contains("missing/a.png"));
+  frameJobs_.savePng(path("empty.png"), [] { return QImage(); });
+  finish();
+  EXPECT_TRUE(said_.contains("empty data window")) << said_.toStdString();
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "empty.png"));
 }
 
 }  // namespace

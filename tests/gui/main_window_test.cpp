@@ -16,6 +16,7 @@
 #include <map>
 
 #include "gui/canvas.h"
+#include "gui/depth_panel.h"
 #include "gui/key_sheet.h"
 #include "gui/recent_files.h"
 
@@ -100,9 +101,16 @@ TEST_F(MainWindowTest, ANewWindowLooksLikeTheLastOne) {
   changed.display.display = "Rec.1886 / Rec.709";
   window_.session().setView(changed);
   window_.findChild<QDockWidget*>("depth")->hide();
+  const auto logDepth = [](MainWindow& window) { return window.findChild<DepthPanel*>()->logDepthAction(); };
+  logDepth(window_)->setChecked(true);
+  window_.frames().player().setFps(12);
+  window_.frames().player().setRepeat(Repeat::PingPong);
   window_.close();
   MainWindow next;
   next.restore();
+  EXPECT_TRUE(logDepth(next)->isChecked());
+  EXPECT_EQ(next.frames().player().fps(), 12);
+  EXPECT_EQ(next.frames().player().repeat(), Repeat::PingPong);
   EXPECT_EQ(next.session().view().display.display, changed.display.display);
   EXPECT_TRUE(next.findChild<QDockWidget*>("depth")->isHidden());
   EXPECT_FALSE(next.findChild<QDockWidget*>("inspector")->isHidden());

@@ -42,6 +42,15 @@ TEST(Picture, ChannelsBecomeLayers) {
   EXPECT_EQ(layers.back().kind, Layer::Kind::Count);
 }
 
+TEST(Picture, AYAloneIsGreyAndTheFirst) {
+  const auto layers = layersOf(withChannels({"A", "Y", "Z", "mask.Y", "motion.X", "motion.Y", "variance.Y"}));
+  EXPECT_EQ(layers[0].name, "Y");
+  EXPECT_EQ(layers[0].kind, Layer::Kind::Colour);
+  EXPECT_EQ(find(layers, "mask.Y").kind, Layer::Kind::Colour);
+  EXPECT_EQ(find(layers, "motion.Y").kind, Layer::Kind::Scalar);
+  EXPECT_EQ(find(layers, "variance.Y").kind, Layer::Kind::Variance);
+}
+
 TEST(Picture, ALayerThatIsNotThereIsTheFirst) {
   const PicturePtr picture = makePicture("a.exr", withChannels({"A", "B", "G", "R", "Z"}));
   EXPECT_EQ(picture->layer("nothing")->name, "RGBA");
@@ -52,6 +61,9 @@ TEST(Picture, LoadsDeepAndFlat) {
   const PicturePtr deep = loadPicture(FATHOM_DEMO "/smoke.0001.deep.exr");
   ASSERT_NE(deep->deep(), nullptr);
   EXPECT_GT(deep->bytes(), deep->deep()->samples() * deep->deep()->channels.size() * sizeof(float));
+  const PicturePtr flat = loadPicture(FATHOM_DEMO "/sequence.0001.ref.exr");
+  ASSERT_NE(flat->flat(), nullptr);
+  EXPECT_EQ(flat->layer("RGBA")->kind, Layer::Kind::Colour);
   EXPECT_THROW(loadPicture(FATHOM_DEMO "/nothing.exr"), Error);
 }
 

@@ -200,6 +200,37 @@ TEST(Compositor, WindowsOfTheTwoMayDiffer) {
   EXPECT_EQ(compositor.make(request, 1).a.pixel(2, 2), qRgb(0, 0, 0));
 }
 
+TEST(Compositor, AWipeIsOneImage) {
+  Compositor compositor(display());
+  const auto flat = [](float value) {
+    flat::Image image{{10, 5, 18, 7}, {0, 0, 20, 20}, {}, {}};
+    for (const char* name : {"R", "G", "B"}) image.add(name, value);
+    return gui::makePicture("flat.exr", std::move(image));
+  };
+  RenderRequest request{flat(1), flat(0), {}, {10, 5, 18, 7}};
+  request.state.comparison = Comparison::Wipe;
+  const QImage wiped = joined(compositor.make(request, 1), 13.2);
+  EXPECT_EQ(wiped.size(), QSize(8, 2));
+  EXPECT_EQ(qRed(wiped.pixel(2, 1)), 255);
+  EXPECT_EQ(qRed(wiped.pixel(3, 1)), 0);
+  EXPECT_EQ(qRed(joined(compositor.make(request, 1), 99).pixel(7, 0)), 255);
+  EXPECT_EQ(qRed(joined(compositor.make(request, 1), -9).pixel(0, 0)), 0);
+  request.state.comparison = Comparison::SideBySide;
+  EXPECT_EQ(joined(compositor.make(request, 1), 13).size(), QSize(16, 2));
+}
+
+TEST(Compositor, OnlyFalseColoursLookForTheirEnds) {
+  Compositor compositor(display());
+  RenderRequest request = requestFor(makePicture(64, 48));
+  int looks = 0;
+  const Progress progress{[&](double done) { looks += done == 0; }, {}};
+  compositor.make(request, 1, progress);
+  EXPECT_EQ(looks, 1);
+  request.state.layer = "Z";
+  compositor.make(request, 1, progress);
+  EXPECT_EQ(looks, 3);
+}
+
 TEST(Compositor, SamplesThatAreNoNumberAreMarkedWhereTheyAreLeft) {
   Compositor compositor(display());
   reference::Pixels pixels(4, {{2, 2, 0.5f, 0.5f, 7}, {5, 5, 1, 0.25f, 9}});
