@@ -41,9 +41,9 @@ FilePattern beside(const FilePattern& output, const std::string& component) {
   return result;
 }
 
-FrameInputs inputsAt(const DenoiseRequest& request, int frame) {
+FrameInputs inputsAt(const DenoiseRequest& request, const FilePattern& input, int frame) {
   const auto at = [&](const std::string& path) { return path.empty() ? path : parsePattern(path).at(frame); };
-  FrameInputs inputs{at(request.input), at(request.features), {}, at(request.alpha)};
+  FrameInputs inputs{input.at(frame), at(request.features), {}, at(request.alpha)};
   for (size_t i = 0; i < request.halves.size(); ++i) inputs.halves[i] = at(request.halves[i]);
   return inputs;
 }
@@ -52,7 +52,7 @@ std::vector<DenoiseFrame> framesOf(const DenoiseRequest& request, const Sequence
   const FilePattern output = outputPattern("-o", request.output, sequence.pattern);
   std::vector<DenoiseFrame> frames;
   for (const int number : sequence.frames) {
-    DenoiseFrame frame{number, inputsAt(request, number), {}};
+    DenoiseFrame frame{number, inputsAt(request, sequence.pattern, number), {}};
     frame.outputs.image = output.at(number);
     if (!request.flattened.empty())
       frame.outputs.flattened = outputPattern("--flat", request.flattened, sequence.pattern).at(number);
@@ -112,6 +112,7 @@ std::string firstToDo(const DenoiseJob& job) {
 
 // The job without its plan.
 DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequence, bool overlap) {
+  if (sequence.frames.empty()) fail("{}: expected at least one frame, found none", request.input);
   DenoiseJob job;
   job.frames = framesOf(request, sequence);
   for (const DenoiseFrame& frame : job.frames) checkOutputs(frame);
@@ -128,7 +129,7 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
                       const std::string& wanted) {
   std::vector<FrameInputs> candidates;
   for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
-    candidates.push_back(inputsAt(request, frame));
+    candidates.push_back(inputsAt(request, sequence.pattern, frame));
   SequencePlan plan = planSequence(candidates, source, request.params, wanted);
   if (!plan.deep && !request.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
@@ -155,7 +156,7 @@ DenoiseJob makeDenoiseJob(const DenoiseRequest& request, const Sequence& sequenc
 
 AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, int frame, const Progress& progress) {
   const SourceOptions options = sourceOptions(request);
-  const FrameInputs inputs = inputsAt(request, frame);
+  const FrameInputs inputs = inputsAt(request, sequence.pattern, frame);
   SequencePlan plan = makePlan(request, sequence, options, inputs.main);
   progress.at(0);
   FrameSource source = openFrame(inputs, options, plan);

@@ -123,7 +123,8 @@ void FrameJobs::denoiseSequence(const QString& output, deep::Quality quality) {
   cli::DenoiseRequest request = requestOf(source, quality, memory_);
   request.output = output.toStdString();
   cli::Sequence sequence{source.pattern, source.frames, {}};
-  std::erase_if(sequence.frames, [&player = frames_.player()](int f) { return f < player.in() || f > player.out(); });
+  if (source.isSequence())  // and so that whose frames are played
+    std::erase_if(sequence.frames, [&player = frames_.player()](int f) { return f < player.in() || f > player.out(); });
   const auto work = [this, request, sequence, output](const Progress& progress) {
     SequenceProgress frames(progress, sequence.frames.size());
     const auto reports = cli::denoiseSequence(cli::makeDenoiseJob(request, sequence, true), frames, progress.stop);

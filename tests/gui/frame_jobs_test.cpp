@@ -7,6 +7,7 @@
 #include <QTest>
 #include <filesystem>
 
+#include "cli/denoise_job.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
@@ -100,6 +101,19 @@ TEST_F(FrameJobsTest, WhatCannotBeDenoisedIsSaid) {
   frameJobs_.denoiseSequence(path("missing/clean.exr"));
   finish();
   EXPECT_TRUE(said_.contains("missing/clean.exr"));
+}
+
+// Whatever is played, and whatever stands in its name.
+TEST_F(FrameJobsTest, APlainFileIsDenoisedToAFile) {
+  std::filesystem::copy_file(file("noisy", 1), folder_ / "plain#.exr");
+  open("plain#.exr");
+  frames_.openB(path("noisy.#.exr"));
+  frames_.player().setIn(2);
+  frameJobs_.denoiseSequence(path("clean.exr"), deep::Quality::Fast);
+  finish();
+  EXPECT_EQ(said_, "1 of 1 frames denoised");
+  ASSERT_TRUE(waitFor([&] { return session_.b() && session_.b()->path == folder_ / "clean.exr"; }));
+  EXPECT_THROW(cli::makeDenoiseJob({}, {}, false), Error);
 }
 
 TEST_F(FrameJobsTest, SavesWhatTheRangeLeaves) {
