@@ -206,7 +206,7 @@ void ComparePanel::measure() {
   if (frames_.player().playing()) return settle_.start();  // that needs the processor more
   const PicturePtr a = session_.a(), b = session_.b();
   const std::vector<float> clips = clipsOf(session_.view());
-  if (a == measuredA_ && b == measuredB_ && clips == measuredClips_) return;
+  if (a == measuredA_.lock() && b == measuredB_.lock() && clips == measuredClips_) return;
   background_.clear();
   measuredA_ = a;
   measuredB_ = b;
@@ -242,7 +242,8 @@ void ComparePanel::showNumbers(const ComparedNumbers& numbers) {
 
 void ComparePanel::clearNumbers(const QString& why) {
   background_.clear();
-  measuredA_ = measuredB_ = nullptr;
+  measuredA_.reset();
+  measuredB_.reset();
   table_->setColumnCount(0);
   table_->hide();
   notes_->setText(why);

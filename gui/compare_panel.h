@@ -54,7 +54,7 @@ class ComparePanel : public QWidget {
   QTimer settle_;  // numbers are made when nothing has changed for a moment
   Background background_;
   // What the numbers on show are of.
-  PicturePtr measuredA_, measuredB_;
+  std::weak_ptr<const Picture> measuredA_, measuredB_;
   std::vector<float> measuredClips_;
 };
 

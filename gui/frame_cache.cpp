@@ -12,6 +12,7 @@ namespace fathom::gui {
 namespace {
 
 constexpr int kSettle = 200;  // ms
+constexpr int kPoll = 2000;   // ms
 // A file that changed so recently and cannot be read is being written: it is tried again.
 constexpr std::chrono::nanoseconds kYoung = std::chrono::seconds(2);
 
@@ -24,14 +25,21 @@ void dropElsewhere(PicturePtr& picture) {
 
 }  // namespace
 
-FrameCache::FrameCache(QObject* parent, Load load)
-    : QObject(parent), load_(load ? std::move(load) : [](const std::string& path) { return loadPicture(path); }) {
+FrameCache::FrameCache(QObject* parent, Load load) : QObject(parent), load_(std::move(load)) {
   thread_.setMaxThreadCount(1);
   settle_.setSingleShot(true);
   settle_.setInterval(kSettle);
   connect(&settle_, &QTimer::timeout, this, &FrameCache::lookAtFiles);
-  connect(&watcher_, &QFileSystemWatcher::fileChanged, &settle_, qOverload<>(&QTimer::start));
-  connect(&watcher_, &QFileSystemWatcher::directoryChanged, &settle_, qOverload<>(&QTimer::start));
+  // Not begun anew by each change: a file that always changes is looked at, too.
+  const auto settle = [this] {
+    if (!settle_.isActive()) settle_.start();
+  };
+  connect(&watcher_, &QFileSystemWatcher::fileChanged, this, settle);
+  connect(&watcher_, &QFileSystemWatcher::directoryChanged, this, settle);
+  connect(&poll_, &QTimer::timeout, this, [this, settle] {
+    if (shownChanged()) settle();
+  });
+  poll_.start(kPoll);
 }
 
 FrameCache::~FrameCache() {
@@ -84,6 +92,7 @@ void FrameCache::want(std::vector<std::string> paths, size_t shown) {
   for (size_t i = 0; i < shown_; ++i)
     if (const auto found = entries_.find(wanted_[i]); found != entries_.end()) found->second.used = clock_;
   watch();
+  evict();
   readNext();
 }
 
@@ -91,8 +100,13 @@ void FrameCache::put(const std::string& name, PicturePtr picture) {
   Entry& entry = entries_[name];
   dropElsewhere(entry.picture);
   entry = {std::move(picture), {}, {}, ++clock_, false, false};
-  evict();
   emit contentChanged();
+}
+
+void FrameCache::forgetMade() {
+  for (auto& [name, entry] : entries_)
+    if (!entry.isFile) dropElsewhere(entry.picture);
+  if (std::erase_if(entries_, [](const auto& of) { return !of.second.isFile; }) > 0) emit contentChanged();
 }
 
 // The files on the screen, for one that is written in place, and their folders, for one that is replaced or appears.
@@ -108,6 +122,21 @@ void FrameCache::watch() {
     if (gone.removeAll(path) == 0) fresh << path;
   if (!gone.isEmpty()) watcher_.removePaths(gone);
   if (!fresh.isEmpty()) watcher_.addPaths(fresh);
+}
+
+bool FrameCache::shownChanged() const {
+  return std::any_of(wanted_.begin(), wanted_.begin() + std::ptrdiff_t(shown_), [this](const std::string& path) {
+    const auto found = entries_.find(path);
+    if (found == entries_.end() || !found->second.isFile) return false;
+    const Stamp now = stampOf(path);
+    return now.modified >= 0 && now != found->second.stamp;
+  });
+}
+
+void FrameCache::reload() {
+  for (auto& [path, entry] : entries_)
+    if (entry.isFile && isShown(path)) entry.changed = true;
+  lookAtFiles();
 }
 
 void FrameCache::lookAtFiles() {
@@ -134,12 +163,13 @@ void FrameCache::lookAtFiles() {
 
 void FrameCache::readNext() {
   if (!reading_.empty()) return;
-  size_t sum = 0;
+  size_t sum = 0;  // of what would not go for a file further on: what was put, and the files before it
+  for (const auto& [path, entry] : entries_) sum += entry.isFile || !entry.picture ? 0 : entry.picture->bytes();
   for (size_t i = 0; i < wanted_.size(); ++i) {
     const auto found = entries_.find(wanted_[i]);
     if (found != entries_.end()) {
       Entry& entry = found->second;
-      if (entry.picture) sum += entry.picture->bytes();
+      if (entry.picture && entry.isFile) sum += entry.picture->bytes();
       if (entry.waiting || (!entry.changed && settled(wanted_[i]))) continue;
       entry.changed = false;
     }
@@ -150,11 +180,11 @@ void FrameCache::readNext() {
 
 void FrameCache::read(const std::string& path) {
   reading_ = path;
-  thread_.start([this, path, load = load_] {
+  thread_.start([this, path, load = load_, limit = limit_] {
     Outcome outcome;
     outcome.before = stampOf(path);
     try {
-      outcome.picture = load(path);
+      outcome.picture = load ? load(path) : loadPicture(path, limit);
     } catch (...) {
       outcome.failure = describeException();
     }
@@ -195,7 +225,7 @@ void FrameCache::evict() {
     auto victim = entries_.end();
     std::pair<size_t, uint64_t> best;  // place from the end of what is wanted, use; the smallest goes
     for (auto it = entries_.begin(); it != entries_.end(); ++it) {
-      if (!it->second.picture || isShown(it->first)) continue;
+      if (!it->second.picture || !it->second.isFile || isShown(it->first)) continue;
       const auto place = std::ranges::find(wanted_, it->first);
       const std::pair rank{place == wanted_.end() ? 0 : size_t(wanted_.end() - place), it->second.used};
       if (victim == entries_.end() || rank < best) victim = it, best = rank;

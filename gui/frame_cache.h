@@ -21,7 +21,7 @@ class FrameCache : public QObject {
   Q_OBJECT
 
  public:
-  // Reads a file; called in one thread, for one file at a time. Throws Error.
+  // Reads a file; called in one thread, for one file at a time. Throws Error. By default loadPicture, within the limit.
   using Load = std::function<PicturePtr(const std::string& path)>;
 
   explicit FrameCache(QObject* parent = nullptr, Load load = {});
@@ -29,7 +29,7 @@ class FrameCache : public QObject {
   ~FrameCache() override;
 
   // What the pictures may take together. Those shown stay even where they are larger; of the others those go first that
-  // are not wanted, the least recently used one before others, then those that are wanted last.
+  // are not wanted, the least recently used one before others, then those that are wanted last. What was put stays, too.
   void setLimit(size_t bytes);
   size_t limit() const { return limit_; }
   size_t bytes() const;
@@ -38,8 +38,11 @@ class FrameCache : public QObject {
   // as far as the limit allows; what was wanted before and is not read yet is forgotten. The files on the screen are
   // watched, and read again when they change; of the others, those that changed in the same folder are.
   void want(std::vector<std::string> paths, size_t shown);
-  // A picture that is not a file's, under a name that is none.
+  // A picture that is not a file's, under a name that is none: it cannot be read again, and stays until forgetMade().
   void put(const std::string& name, PicturePtr picture);
+  void forgetMade();
+  // Reads the files on the screen again, and forgets others that have changed.
+  void reload();
 
   // Null: not there (yet).
   PicturePtr find(const std::string& path) const;
@@ -82,6 +85,7 @@ class FrameCache : public QObject {
   static bool isYoung(const Stamp& stamp);
   bool isShown(const std::string& path) const;
   void watch();
+  bool shownChanged() const;
   void lookAtFiles();
   void readNext();
   void read(const std::string& path);
@@ -97,7 +101,8 @@ class FrameCache : public QObject {
   size_t usualBytes_ = 0;  // of the last picture that was read
   std::string reading_;    // empty: nothing
   QFileSystemWatcher watcher_;
-  QTimer settle_;  // files are looked at when they have not changed for a moment
+  QTimer settle_;  // files are looked at a moment after they have changed
+  QTimer poll_;    // for folders of other machines, which the watcher does not hear of
   Caller caller_;
   QThreadPool thread_;
 };

@@ -2,11 +2,18 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <unordered_set>
 #include <utility>
 
 #include "flat/error.h"
 
 namespace fathom::gui {
+
+namespace {
+
+constexpr size_t kMostAhead = 256;  // frames
+
+}  // namespace
 
 std::string Source::at(int frame) const {
   const std::string file = pattern.at(frame);
@@ -25,6 +32,21 @@ Found findSource(const QString& path, bool asSequence) {
   cli::Sequence sequence = cli::findSequence(name);
   const int first = sequence.frames.front();
   return {{std::move(sequence.pattern), std::move(sequence.frames), {}}, first};
+}
+
+QStringList distinctSources(const QStringList& paths) {
+  QStringList result;
+  std::unordered_set<std::string> taken;
+  for (const QString& path : paths) {
+    if (!taken.insert(path.toStdString()).second) continue;
+    result << path;
+    try {
+      const Source source = findSource(path).source;
+      for (const int frame : source.frames) taken.insert(source.at(frame));
+    } catch (const Error&) {  // said when it is opened
+    }
+  }
+  return result;
 }
 
 Frames::Frames(Session& session, QObject* parent, FrameCache::Load load)
@@ -61,8 +83,7 @@ void Frames::setStage(Show show, std::function<bool()> busy) {
 
 void Frames::pass() {
   if (stage_) return stage_(originalA_, originalB_);
-  session_.setA(originalA_);
-  session_.setB(originalB_);
+  session_.setPictures(originalA_, originalB_);
 }
 
 // The frames of A are played, or else those of B.
@@ -76,28 +97,36 @@ void Frames::setFrames(int frame) {
 }
 
 void Frames::want() {
+  const auto isMade = [](const std::optional<Source>& source) { return source && !source->made.isEmpty(); };
+  if (!isMade(a_) && !isMade(b_) && !before_) cache_.forgetMade();
   std::vector<std::string> paths;
+  std::unordered_set<std::string> asked;
   const auto add = [&](int frame) {
     for (const std::optional<Source>* source : {&a_, &b_}) {
       if (!*source) continue;
       std::string path = (*source)->at(frame);
       // What was made cannot be read again.
       if (!(*source)->made.isEmpty() && !cache_.find(path)) continue;
-      if (std::ranges::find(paths, path) == paths.end()) paths.push_back(std::move(path));
+      if (asked.insert(path).second) paths.push_back(std::move(path));
     }
   };
   add(player_.frame());
   const size_t shown = paths.size();
-  for (const int frame : player_.ahead(player_.frames().size())) add(frame);
+  for (const int frame : player_.ahead(kMostAhead)) add(frame);
   cache_.want(std::move(paths), shown);
 }
 
-// Both together, so that frames that do not belong together are never compared.
+// Both together, so that frames that do not belong together are never compared: where A cannot be read, B stays, too.
 void Frames::show() {
   const int frame = player_.frame();
   if (!ready(frame)) return;
-  const PicturePtr a = a_ ? cache_.find(a_->at(frame)) : nullptr, b = b_ ? cache_.find(b_->at(frame)) : nullptr;
-  if (a) before_.reset();
+  const PicturePtr a = a_ ? cache_.find(a_->at(frame)) : nullptr;
+  PicturePtr b = b_ ? cache_.find(b_->at(frame)) : nullptr;
+  if (a && std::exchange(before_, {})) {
+    want();
+    emit opened();
+  }
+  if (!a && a_ && b_) b = originalB_;
   if (!a && a_ && !a_->made.isEmpty()) session_.say(tr("no %1").arg(QString::fromStdString(a_->at(frame))));
   const bool changed = (a && a != originalA_) || b != originalB_;
   if (a) originalA_ = a;
@@ -111,6 +140,7 @@ void Frames::readFailed(const std::string& path, const QString& reason) {
   if (before_ && a_ && !a_->isSequence() && a_->at(frame) == path) {
     const Before before = *std::exchange(before_, {});
     a_ = before.a;
+    if (!b_) b_ = before.madeB;
     player_.setFrames(before.frames, before.frame);
     emit sourcesChanged();
     want();
@@ -134,9 +164,9 @@ void Frames::setResult(const std::string& file, const QString& made, PicturePtr 
 void Frames::open(const QString& path) {
   try {
     Found found = findSource(path);
-    if (!before_) before_ = Before{a_, player_.frames(), player_.frame()};
+    if (!before_) before_ = Before{a_, {}, player_.frames(), player_.frame()};
     a_ = std::move(found.source);
-    if (b_ && !b_->made.isEmpty()) b_.reset();
+    if (b_ && !b_->made.isEmpty()) before_->madeB = std::exchange(b_, {});
     setFrames(found.frame);
   } catch (const std::exception& e) {
     return session_.say(QString::fromStdString(e.what()));
@@ -147,6 +177,7 @@ void Frames::open(const QString& path) {
 }
 
 void Frames::openB(const QString& path) {
+  if (!a_) return open(path);
   try {
     b_ = findSource(path, a_ && a_->isSequence()).source;
     setFrames(player_.frame());
@@ -161,6 +192,7 @@ void Frames::openB(const QString& path) {
 void Frames::closeB() {
   if (!b_) return;
   b_.reset();
+  setFrames(player_.frame());
   emit sourcesChanged();
   want();
   show();
@@ -169,7 +201,21 @@ void Frames::closeB() {
 void Frames::swap() {
   if (!a_ || !b_) return;
   std::swap(a_, b_);
+  setFrames(player_.frame());
   emit sourcesChanged();
+  want();
+  show();
+}
+
+void Frames::reload() {
+  try {
+    for (std::optional<Source>* source : {&a_, &b_})
+      if (*source && (*source)->isSequence()) (*source)->frames = cli::findSequence((*source)->pattern.text()).frames;
+  } catch (const Error& e) {
+    return session_.say(QString::fromStdString(e.what()));
+  }
+  setFrames(player_.frame());
+  cache_.reload();
   want();
   show();
 }

@@ -3,6 +3,7 @@
 
 #include <QObject>
 #include <QString>
+#include <QStringList>
 #include <functional>
 #include <optional>
 #include <string>
@@ -34,6 +35,9 @@ struct Found {
 };
 Found findSource(const QString& path, bool asSequence = true);
 
+// Names and patterns without the files that belong to the sequence of an earlier one: "a.1.exr a.2.exr b.exr" are two.
+QStringList distinctSources(const QStringList& paths);
+
 class Frames : public QObject {
   Q_OBJECT
 
@@ -63,18 +67,22 @@ class Frames : public QObject {
  public slots:
   // Files and patterns. What cannot be read is said, and what is on the screen stays.
   void open(const QString& path);
-  // Where A is a sequence, so is B, at the same frame numbers.
+  // Where A is a sequence, so is B, at the same frame numbers. Opens A where there is none.
   void openB(const QString& path);
   void closeB();
   void swap();
+  // Reads again what is on the screen, and looks for new frames of sequences.
+  void reload();
 
  signals:
   // A or B is another one.
   void sourcesChanged();
+  // The first picture of an A that was opened was read.
+  void opened();
 
  private:
   struct Before {
-    std::optional<Source> a;
+    std::optional<Source> a, madeB;  // what was made of A
     std::vector<int> frames;
     int frame;
   };

@@ -161,9 +161,9 @@ PicturePtr makePicture(std::string path, std::variant<deep::DeepImage, flat::Ima
   return std::make_shared<Picture>(Picture{std::move(path), std::move(image), std::move(layers)});
 }
 
-PicturePtr loadPicture(const std::string& path, const std::string& part, const Progress& progress) {
+PicturePtr loadPicture(const std::string& path, size_t memory, const Progress& progress) {
   progress.at(0);
-  cli::ChainSource source(path, part, size_t(64) << 30);
+  cli::ChainSource source(path, {}, memory);
   const Box window = source.dataWindow();
   PicturePtr picture = makePicture(path, source.read(window.y0, window.y1));
   progress.at(1);

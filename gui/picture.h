@@ -51,8 +51,8 @@ std::vector<Layer> layersOf(const flat::Image& image);
 
 PicturePtr makePicture(std::string path, std::variant<deep::DeepImage, flat::Image> image);
 
-// Reads a file whole, the part by number or name; empty: the first deep part, or else the first. Throws Error and
-// Cancelled.
-PicturePtr loadPicture(const std::string& path, const std::string& part = {}, const Progress& progress = {});
+// Reads a file whole, the first deep part, or else the first. Throws Error, where it would take more bytes than `memory`,
+// too, and Cancelled.
+PicturePtr loadPicture(const std::string& path, size_t memory = size_t(8) << 30, const Progress& progress = {});
 
 }  // namespace fathom::gui

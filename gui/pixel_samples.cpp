@@ -1,5 +1,6 @@
 #include "gui/pixel_samples.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "deep/ops/sample.h"
@@ -65,8 +66,13 @@ double PixelSamples::alpha() const {
 }
 
 std::vector<std::string> colourChannels(const Picture& picture, const std::string& layer) {
-  const auto coloured = [](const Layer* of) {
-    return of && of->kind == Layer::Kind::Colour && of->channels.size() > 2;
+  // A draft does not have the channels of all its layers.
+  const auto isThere = [&](const std::string& channel) {
+    return picture.deep() ? picture.deep()->find(channel) != nullptr : picture.flat()->find(channel) != nullptr;
+  };
+  const auto coloured = [&](const Layer* of) {
+    return of && of->kind == Layer::Kind::Colour && of->channels.size() > 2 &&
+           std::ranges::all_of(of->channels, isThere);
   };
   const Layer* found = picture.layer(layer);
   if (!coloured(found)) found = picture.layer("RGBA");  // or the first

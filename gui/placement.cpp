@@ -6,6 +6,7 @@
 #include "deep/ops/insert.h"
 #include "deep/statistics.h"
 #include "flat/error.h"
+#include "gui/pixel_samples.h"
 
 namespace fathom::gui {
 
@@ -33,12 +34,12 @@ bool isWorthADraft(const Picture& picture) {
   return picture.deep() && picture.deep()->channels.size() > kFewChannels;
 }
 
-// The image with the channels that it takes to see a layer.
-deep::DeepImage copyForLayer(const deep::DeepImage& image, const std::vector<std::string>& layer) {
+// The image with some of its channels, and those that it takes to place something.
+deep::DeepImage copyWith(const deep::DeepImage& image, const std::vector<std::string>& channels) {
   deep::DeepImage result = image.copyLayout();
   for (const deep::Channel& channel : image.channels) {
     const bool placing = channel.name == "A" || channel.name == "Z" || channel.name == "ZBack";
-    if (!placing && std::ranges::find(layer, channel.name) == layer.end()) continue;
+    if (!placing && std::ranges::find(channels, channel.name) == channels.end()) continue;
     deep::Channel& copy = result.add(channel.name, channel.type);
     std::ranges::copy(channel.values, copy.values.begin());
     std::ranges::copy(channel.ids, copy.ids.begin());
@@ -46,14 +47,16 @@ deep::DeepImage copyForLayer(const deep::DeepImage& image, const std::vector<std
   return result;
 }
 
-// The picture with the volume; a draft has no channels but those of the layer, and says that it has all.
+// The picture with the volume; a draft has no channels but those of the layer and of the colours beside it, and says that
+// it has all.
 PicturePtr placedIn(const PicturePtr& in, const deep::DeepImage& volume, const deep::Transform& transform,
                     const std::string* draftLayer) {
   if (!in || !in->deep()) return in;
   const Layer* layer = draftLayer ? in->layer(*draftLayer) : nullptr;
   if (!layer) return makePicture(in->path, deep::insert(in->deep()->copy(), volume.copy(), transform));
-  deep::DeepImage seen =
-      deep::insert(copyForLayer(*in->deep(), layer->channels), copyForLayer(volume, layer->channels), transform);
+  std::vector<std::string> channels = colourChannels(*in, layer->name);
+  channels.insert(channels.end(), layer->channels.begin(), layer->channels.end());
+  deep::DeepImage seen = deep::insert(copyWith(*in->deep(), channels), copyWith(volume, channels), transform);
   return std::make_shared<Picture>(Picture{in->path, std::move(seen), in->layers});
 }
 
@@ -68,8 +71,7 @@ Placement::Placement(Session& session, Frames& frames, QObject* parent)
   // The picture without the volume is better than that of another frame.
   connect(&background_, &Background::failed, this, [this](const QString& line) {
     session_.say(line);
-    session_.setA(a_);
-    session_.setB(b_);
+    session_.setPictures(a_, b_);
   });
 }
 
@@ -120,10 +122,11 @@ void Placement::setTransform(const deep::Transform& transform) {
 }
 
 void Placement::place(bool draft) {
+  if (!a_) return session_.setPictures(a_, b_);
   const auto work = [this, draft, a = a_, b = b_, path = file(), transform = transform_, layer = session_.view().layer,
-                     read = read_](const Progress& progress) -> Background::Deliver {
+                     memory = frames_.cache().limit(), read = read_](const Progress& progress) -> Background::Deliver {
     const deep::DeepImage& image = deepOf(*a, "to place something in");
-    if (read->path != path || !read->picture) *read = {path, loadPicture(path, {}, progress), {}, {}};
+    if (read->path != path || !read->picture) *read = {path, loadPicture(path, memory, progress), {}, {}};
     const deep::DeepImage& volume = deepOf(*read->picture, "to place");
     if (std::exchange(read->a, a) != a) read->depths = depthsOf(image, volume);
     progress.at(0.3);
@@ -132,8 +135,7 @@ void Placement::place(bool draft) {
     const PicturePtr placedB = placedIn(b, volume, transform, draft ? &layer : nullptr);
     return [this, draft, a, b, placedA, placedB, depths = read->depths] {
       if (a != a_ || b != b_) return;
-      session_.setA(placedA);
-      session_.setB(placedB);
+      session_.setPictures(placedA, placedB);
       if (std::exchange(depths_, depths) != depths) emit depthsChanged();
       if (draft && !background_.busy()) place();
     };

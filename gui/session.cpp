@@ -1,7 +1,5 @@
 #include "gui/session.h"
 
-#include <utility>
-
 namespace fathom::gui {
 
 namespace {
@@ -16,12 +14,9 @@ bool assign(T& to, T value) {
 
 }  // namespace
 
-void Session::setA(PicturePtr picture) {
-  if (assign(a_, std::move(picture))) emit picturesChanged();
-}
-
-void Session::setB(PicturePtr picture) {
-  if (assign(b_, std::move(picture))) emit picturesChanged();
+void Session::setPictures(PicturePtr a, PicturePtr b) {
+  const bool isNewA = assign(a_, std::move(a)), isNewB = assign(b_, std::move(b));
+  if (isNewA || isNewB) emit picturesChanged();
 }
 
 void Session::setView(const ViewState& view) {

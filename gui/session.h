@@ -6,6 +6,7 @@
 #include <QPoint>
 #include <QString>
 #include <optional>
+#include <utility>
 
 #include "flat/box.h"
 #include "gui/picture.h"
@@ -29,8 +30,10 @@ class Session : public QObject {
   // The pixel that inspectors show: the pinned one, or else that under the cursor.
   std::optional<QPoint> pixel() const { return pin_ ? pin_ : cursor_; }
 
-  void setA(PicturePtr picture);
-  void setB(PicturePtr picture);
+  void setA(PicturePtr picture) { setPictures(std::move(picture), b_); }
+  void setB(PicturePtr picture) { setPictures(a_, std::move(picture)); }
+  // Both at once: nobody sees the one with the other's predecessor.
+  void setPictures(PicturePtr a, PicturePtr b);
   void setView(const ViewState& view);
   void setCursor(std::optional<QPoint> pixel);
   void setPin(std::optional<QPoint> pixel);

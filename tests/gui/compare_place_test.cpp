@@ -14,6 +14,7 @@
 #include "flat/error.h"
 #include "flat/io.h"
 #include "gui/compare_panel.h"
+#include "gui/inspector_panel.h"
 #include "gui/place_panel.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/rendered_frame.h"
@@ -110,6 +111,17 @@ TEST_F(PanelsTest, ThePanelShowsModesAndNumbers) {
   EXPECT_EQ(session_.view().comparison, Comparison::A);
 }
 
+TEST_F(PanelsTest, APanelThatIsHiddenHoldsNoPictures) {
+  ComparePanel panel(session_, frames_);
+  panel.show();
+  session_.setPictures(loadPicture(folder_ / "noisy.exr"), loadPicture(folder_ / "truth.exr"));
+  ASSERT_TRUE(waitFor([&] { return panel.findChild<QTableWidget*>()->columnCount() == 2; }));
+  panel.hide();
+  const std::weak_ptr<const Picture> a = session_.a(), b = session_.b();
+  session_.setPictures(loadPicture(folder_ / "other.exr"), loadPicture(folder_ / "other.exr"));
+  EXPECT_TRUE(waitFor([&] { return a.expired() && b.expired(); }));
+}
+
 TEST_F(PanelsTest, AVolumeIsPlacedMovedAndRemoved) {
   open("noisy.exr");
   const PicturePtr original = session_.a();
@@ -159,6 +171,46 @@ TEST_F(PanelsTest, WhileItMovesThereIsADraftWithTheChannelsThatAreSeen) {
   ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
   EXPECT_THAT(seen, ::testing::ElementsAre(5, all));  // R G B A Z
   EXPECT_GT(all, 5u);
+}
+
+// The inspector shows colours whatever layer is seen, and another layer may be chosen while there is a draft.
+TEST_F(PanelsTest, TheInspectorShowsADraftOfAnyLayer) {
+  open("noisy.exr");
+  const auto seeLayer = [this](const std::string& name) {
+    ViewState view = session_.view();
+    view.layer = name;
+    session_.setView(view);
+  };
+  seeLayer("Z");
+  session_.setPin(QPoint(10, 10));
+  InspectorPanel inspector(session_);
+  inspector.show();
+  Placement placement(session_, frames_);
+  placement.open(path("other.exr"));
+  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
+  QObject::connect(
+      &session_, &Session::picturesChanged, &inspector, [&] { seeLayer("diffuse"); }, Qt::SingleShotConnection);
+  placement.setTransform({.z = 1});
+  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
+  EXPECT_EQ(session_.view().layer, "diffuse");
+}
+
+TEST_F(PanelsTest, WithoutAnAThereIsNothingToPlaceIn) {
+  Placement placement(session_, frames_);
+  placement.open(path("other.exr"));
+  frames_.openB(path("noisy.exr"));  // as A, then
+  ASSERT_TRUE(waitFor([&] { return session_.a() && !placement.busy(); }));
+  EXPECT_GT(session_.a()->deep()->samples(), frames_.originalA()->deep()->samples());
+  EXPECT_FALSE(session_.b());
+  // B stays alone where A cannot be read.
+  Session session;
+  Frames frames(session);
+  Placement alone(session, frames);
+  frames.open(path("nothing.exr"));
+  frames.openB(path("noisy.exr"));
+  alone.open(path("other.exr"));
+  ASSERT_TRUE(waitFor([&] { return session.b() && !alone.busy(); }));
+  EXPECT_FALSE(session.a());
 }
 
 TEST_F(PanelsTest, WhatCannotBePlacedIsSaidAndAStaysAsItIs) {

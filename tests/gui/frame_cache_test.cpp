@@ -6,6 +6,7 @@
 
 #include <QSignalSpy>
 #include <QTest>
+#include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <semaphore>
@@ -199,6 +200,54 @@ TEST(FrameCache, AFileThatIsSpoiltKeepsItsLastPictureAndIsTold) {
   std::filesystem::remove(path);
   write(path, "7");
   ASSERT_TRUE(waitFor([&] { return widthOf(cache, path) == 7; }));
+}
+
+// As the watcher does not hear of another machine's changes, nor of a link that leads elsewhere.
+TEST(FrameCache, ChangesThatAreNotToldAreFound) {
+  const TemporaryFolder folder;
+  for (const char* version : {"v1", "v2"}) std::filesystem::create_directory(folder / version);
+  write(folder / "v1/1", "5");
+  write(folder / "v2/1", "50");
+  std::filesystem::create_directory_symlink("v1", folder / "latest");
+  const std::string path = folder / "latest/1";
+  FrameCache cache(nullptr, countedPicture);
+  cache.want({path}, 1);
+  ASSERT_TRUE(waitFor([&] { return widthOf(cache, path) == 5; }));
+  std::filesystem::remove(folder / "latest");
+  std::filesystem::create_directory_symlink("v2", folder / "latest");
+  EXPECT_TRUE(waitFor([&] { return widthOf(cache, path) == 50; }));
+}
+
+TEST(FrameCache, AFileThatAlwaysChangesIsLookedAt) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "1";
+  write(path, "5");
+  FrameCache cache(nullptr, countedPicture);
+  cache.want({path}, 1);
+  ASSERT_TRUE(waitFor([&] { return widthOf(cache, path) == 5; }));
+  QTimer writer;
+  int pixels = 5;
+  QObject::connect(&writer, &QTimer::timeout, [&] { write(path, std::to_string(++pixels)); });
+  writer.start(50);
+  EXPECT_TRUE(QTest::qWaitFor([&] { return widthOf(cache, path) > 5; }, 20000));
+}
+
+TEST(FrameCache, WhatIsShownIsReadAgainWhenAsked) {
+  Disk disk;
+  FrameCache cache(nullptr, disk.load());
+  cache.want({"1", "2"}, 1);
+  ASSERT_TRUE(waitFor([&] { return cache.settled("2"); }));
+  cache.reload();
+  ASSERT_TRUE(waitFor([&] { return disk.order().size() == 3; }));
+  EXPECT_THAT(disk.order(), ElementsAre("1", "2", "1"));
+}
+
+TEST(FrameCache, NoFileIsReadThatNeedsMoreThanTheLimit) {
+  FrameCache cache;
+  cache.setLimit(1000);
+  cache.want({FATHOM_DEMO "/smoke.0001.deep.exr"}, 1);
+  ASSERT_TRUE(waitFor([&] { return cache.settled(FATHOM_DEMO "/smoke.0001.deep.exr"); }));
+  EXPECT_FALSE(cache.find(FATHOM_DEMO "/smoke.0001.deep.exr"));
 }
 
 TEST(FrameCache, AFileThatComesLaterIsRead) {

@@ -1,12 +1,15 @@
 // Files and sequences as A and B, and the bar that plays them.
 #include "gui/frames.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <QSignalSpy>
 #include <QTest>
+#include <atomic>
 #include <filesystem>
+#include <fstream>
 
 #include "flat/error.h"
 #include "flat/io.h"
@@ -38,6 +41,12 @@ class FramesTest : public ::testing::Test {
   }
 
   QString path(const char* name) { return QString::fromStdString(folder_ / name); }
+  // Cuts a file short, long ago.
+  void spoil(const char* name) {
+    std::filesystem::resize_file(folder_ / name, 50);
+    std::filesystem::last_write_time(folder_ / name,
+                                     std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  }
   // What stands in the session's A, or B, without its folder.
   static std::string nameOf(const PicturePtr& picture) {
     return picture ? std::filesystem::path(picture->path).filename().string() : "";
@@ -111,9 +120,7 @@ TEST_F(FramesTest, AFileThatCannotBeReadIsSaidAndTheLastPictureStays) {
   frames_.open(path("a.0002.exr"));
   ASSERT_TRUE(shows("a.0002.exr"));
   std::filesystem::copy_file(folder_ / "a.0001.exr", folder_ / "broken.exr");
-  std::filesystem::resize_file(folder_ / "broken.exr", 50);
-  std::filesystem::last_write_time(folder_ / "broken.exr",
-                                   std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  spoil("broken.exr");
   frames_.open(path("broken.exr"));
   ASSERT_TRUE(waitFor([&] { return said_.contains("broken.exr"); }));
   EXPECT_EQ(nameOf(session_.a()), "a.0002.exr");
@@ -139,6 +146,114 @@ TEST_F(FramesTest, AResultComesAsBAndStaysWithItsFrame) {
   ASSERT_TRUE(shows("plain.exr", ""));
   frames_.setResult(folder_ / "a.0002.exr", "denoised", session_.a());
   EXPECT_EQ(session_.b(), nullptr);
+}
+
+TEST_F(FramesTest, AResultStaysWhereTheMemoryIsFull) {
+  Frames frames(session_, nullptr, [](const std::string& name) { return loadPicture(name); });
+  frames.open(path("a.0001.exr"));
+  ASSERT_TRUE(waitFor([&] { return frames.cached(1) && frames.cached(2) && frames.cached(4); }));
+  frames.cache().setLimit(frames.cache().bytes() * 5 / 6);
+  ASSERT_TRUE(frames.cached(2));
+  const auto result = [&](int frame) {
+    const Box window{0, 0, 4, 3};
+    const std::string name = "result" + std::to_string(frame);
+    frames.setResult(frames.a()->at(frame), "denoised", makePicture(name, flat::Image{window, window, {}, {}}));
+  };
+  result(1);
+  EXPECT_EQ(nameOf(session_.b()), "result1");
+  frames.player().next();
+  ASSERT_TRUE(shows("a.0002.exr"));
+  result(2);
+  EXPECT_EQ(nameOf(session_.b()), "result2");
+  frames.player().previous();
+  EXPECT_TRUE(shows("a.0001.exr", "result1"));
+  const QSignalSpy loaded(&frames.cache(), &FrameCache::loaded);
+  QTest::qWait(200);
+  EXPECT_LE(loaded.count(), 1);  // there is no room for more
+  const std::string made = frames.b()->at(1);
+  frames.closeB();
+  EXPECT_FALSE(frames.cache().find(made));
+}
+
+TEST_F(FramesTest, AResultStaysWhereTheNextFileCannotBeRead) {
+  frames_.open(path("a.0002.exr"));
+  ASSERT_TRUE(shows("a.0002.exr"));
+  const Box window{0, 0, 4, 3};
+  frames_.setResult(folder_ / "a.0002.exr", "denoised", makePicture("result", flat::Image{window, window, {}, {}}));
+  frames_.open(path("nothing.exr"));
+  ASSERT_TRUE(waitFor([&] { return said_.contains("nothing.exr"); }));
+  EXPECT_TRUE(frames_.b());
+  EXPECT_TRUE(shows("a.0002.exr", "result"));
+}
+
+TEST_F(FramesTest, FramesThatDoNotBelongTogetherAreNeverSeen) {
+  frames_.open(path("a.0002.exr"));
+  frames_.openB(path("b.0002.exr"));
+  ASSERT_TRUE(shows("a.0002.exr", "b.0002.exr"));
+  std::vector<std::string> seen;
+  QObject::connect(&session_, &Session::picturesChanged,
+                   [&] { seen.push_back(nameOf(session_.a()) + " " + nameOf(session_.b())); });
+  frames_.player().next();
+  ASSERT_TRUE(shows("a.0004.exr", "b.0004.exr"));
+  EXPECT_THAT(seen, ElementsAre("a.0004.exr b.0004.exr"));
+}
+
+TEST_F(FramesTest, BWaitsWithAnAThatCannotBeRead) {
+  spoil("a.0004.exr");
+  frames_.open(path("a.0002.exr"));
+  frames_.openB(path("b.0002.exr"));
+  ASSERT_TRUE(shows("a.0002.exr", "b.0002.exr"));
+  frames_.player().next();
+  ASSERT_TRUE(waitFor([&] { return frames_.ready(4); }));
+  EXPECT_EQ(nameOf(session_.a()), "a.0002.exr");
+  EXPECT_EQ(nameOf(session_.b()), "b.0002.exr");
+  frames_.closeB();
+  EXPECT_TRUE(shows("a.0002.exr", ""));
+}
+
+TEST_F(FramesTest, TheFramesAreThoseOfTheSourceThatLeads) {
+  frames_.open(path("b.####.exr"));
+  frames_.openB(path("a.####.exr"));
+  frames_.swap();
+  EXPECT_THAT(frames_.player().frames(), ElementsAre(1, 2, 4));
+  frames_.open(path("plain.exr"));
+  frames_.openB(path("b.####.exr"));
+  EXPECT_THAT(frames_.player().frames(), ElementsAre(2, 4));
+  frames_.closeB();
+  EXPECT_THAT(frames_.player().frames(), ElementsAre(0));
+  EXPECT_TRUE(shows("plain.exr", ""));
+}
+
+TEST_F(FramesTest, OfALongSequenceOnlyWhatComesSoonIsReadAhead) {
+  for (int frame = 0; frame < 300; ++frame) std::ofstream(folder_ / fmt::format("long.{:03}.exr", frame));
+  std::atomic<int> reads = 0;
+  Frames frames(session_, nullptr, [&](const std::string& path) {
+    ++reads;
+    const Box window{0, 0, 1, 1};
+    return makePicture(path, flat::Image{window, window, {}, {}});
+  });
+  frames.open(path("long.###.exr"));
+  ASSERT_TRUE(waitFor([&] { return reads >= 257; }));
+  QTest::qWait(50);
+  EXPECT_EQ(reads, 257);
+}
+
+TEST_F(FramesTest, FilesOfOneSequenceAreOneSource) {
+  EXPECT_EQ(distinctSources({path("a.0002.exr"), path("a.0001.exr"), path("plain.exr"), path("b.####.exr"),
+                             path("b.0002.exr"), path("nothing.exr"), path("nothing.####.exr")}),
+            QStringList({path("a.0002.exr"), path("plain.exr"), path("b.####.exr"), path("nothing.exr"),
+                         path("nothing.####.exr")}));
+}
+
+TEST_F(FramesTest, ReloadingFindsNewFrames) {
+  frames_.open(path("b.0002.exr"));
+  ASSERT_TRUE(shows("b.0002.exr"));
+  const PicturePtr before = session_.a();
+  writeFrame(folder_ / "b.0003.exr");
+  frames_.reload();
+  EXPECT_THAT(frames_.player().frames(), ElementsAre(2, 3, 4));
+  EXPECT_TRUE(waitFor([&] { return session_.a() != before; }));
+  EXPECT_EQ(nameOf(session_.a()), "b.0002.exr");
 }
 
 TEST_F(FramesTest, AStageStandsBetweenTheFilesAndTheScreen) {
