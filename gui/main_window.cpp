@@ -5,6 +5,7 @@
 #include <QDragEnterEvent>
 #include <QDropEvent>
 #include <QFileInfo>
+#include <QMessageBox>
 #include <QMimeData>
 #include <QSettings>
 #include <QStatusBar>
@@ -99,6 +100,7 @@ void MainWindow::dropEvent(QDropEvent* event) {
     if (url.isLocalFile()) files << url.toLocalFile();
   if (files.isEmpty()) return;
   const bool compare = event->modifiers() & Qt::ShiftModifier;
+  files = distinctSources(files);
   if (compare)
     frames_.openB(files[0]);
   else
@@ -108,6 +110,10 @@ void MainWindow::dropEvent(QDropEvent* event) {
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {
+  if (jobs_.busy() &&
+      QMessageBox::question(this, "Close", QString("%1 has not ended. Stop it and close?").arg(jobs_.name())) !=
+          QMessageBox::Yes)
+    return event->ignore();
   QSettings settings;
   settings.setValue("geometry", saveGeometry());
   settings.setValue("state", saveState());

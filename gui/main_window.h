@@ -43,8 +43,9 @@ class MainWindow : public QMainWindow {
 
  protected:
   void dragEnterEvent(QDragEnterEvent* event) override;
-  // The first file is A, a second one B; with Shift held, the first is B.
+  // The first file or sequence is A, a second one B; with Shift held, the first is B.
   void dropEvent(QDropEvent* event) override;
+  // Asks first while a job runs.
   void closeEvent(QCloseEvent* event) override;
 
  private:

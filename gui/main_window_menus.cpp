@@ -60,10 +60,10 @@ void MainWindow::addFileMenu() {
         [this] { open("Open to compare", &Frames::openB); });
   recent_ = new RecentFiles(this);
   menu->addMenu(recent_);
+  addTo(menu, "&Reload", {QKeySequence("F5")}, &frames_, &Frames::reload);
   connect(recent_, &RecentFiles::chosen, &frames_, &Frames::open);
-  connect(&frames_, &Frames::sourcesChanged, this, [this] {
-    if (frames_.a()) recent_->add(QString::fromStdString(frames_.a()->pattern.text()));
-  });
+  connect(&frames_, &Frames::opened, this,
+          [this] { recent_->add(QString::fromStdString(frames_.a()->pattern.text())); });
   menu->addSeparator();
   addTo(menu, "Save Flattened as EXR…", {QKeySequence("Ctrl+S")}, this,
         [this] { save("Save flattened", "exr", [this](const QString& path) { frameJobs_.saveFlattened(path); }); });

@@ -3,16 +3,22 @@
 
 #include <gtest/gtest.h>
 
+#include <QApplication>
 #include <QDockWidget>
+#include <QDropEvent>
 #include <QFileInfo>
 #include <QLabel>
 #include <QLineEdit>
 #include <QMenuBar>
+#include <QMessageBox>
+#include <QMimeData>
 #include <QPointer>
+#include <QPushButton>
 #include <QStatusBar>
 #include <QToolBar>
 #include <QtTest>
 #include <algorithm>
+#include <atomic>
 #include <map>
 
 #include "gui/canvas.h"
@@ -118,6 +124,8 @@ TEST_F(MainWindowTest, ANewWindowLooksLikeTheLastOne) {
 
 TEST_F(MainWindowTest, FilesOpenedLastAreInTheMenu) {
   const QString pattern = QFileInfo(FATHOM_DEMO "/sequence.####.deep.exr").absoluteFilePath();
+  window_.frames().open("/nowhere/nothing.exr");
+  EXPECT_TRUE(QTest::qWaitFor([&] { return window_.statusBar()->currentMessage().contains("nothing.exr"); }, 20000));
   EXPECT_EQ(window_.findChild<RecentFiles*>()->files().value(0), pattern);
 }
 
@@ -140,6 +148,38 @@ TEST(MainWindow, ItsWidgetsGoBeforeWhatTheyReferTo) {
   QObject::connect(&window->placement(), &QObject::destroyed, [&] { EXPECT_EQ(left(), 0); });  // the first to go
   delete window;
   EXPECT_EQ(left(), 0);
+}
+
+TEST_F(MainWindowTest, DroppedFramesOfASequenceAreA) {
+  QMimeData files;
+  files.setUrls({QUrl::fromLocalFile(FATHOM_DEMO "/sequence.0002.deep.exr"),
+                 QUrl::fromLocalFile(FATHOM_DEMO "/sequence.0001.deep.exr")});
+  QDropEvent drop(QPointF(5, 5), Qt::CopyAction, &files, Qt::LeftButton, Qt::NoModifier);
+  static_cast<QObject&>(window_).event(&drop);
+  EXPECT_EQ(window_.frames().player().frame(), 2);
+  EXPECT_FALSE(window_.frames().b());
+}
+
+TEST_F(MainWindowTest, ClosingStopsAJobOnlyAfterAQuestion) {
+  std::atomic<bool> held = true;
+  window_.jobs().add({"work", "Work", [&](const Progress& progress) -> std::function<void()> {
+                        while (held) progress.at(0.5);
+                        return {};
+                      }});
+  const auto closeAnswering = [this](QMessageBox::StandardButton answer) {
+    QTimer::singleShot(0, [answer] {
+      auto* box = qobject_cast<QMessageBox*>(QApplication::activeModalWidget());
+      ASSERT_TRUE(box);
+      box->button(answer)->click();
+    });
+    return window_.close();
+  };
+  EXPECT_FALSE(closeAnswering(QMessageBox::No));
+  EXPECT_TRUE(window_.isVisible());
+  EXPECT_TRUE(window_.jobs().busy());
+  EXPECT_TRUE(closeAnswering(QMessageBox::Yes));
+  held = false;
+  ASSERT_TRUE(QTest::qWaitFor([&] { return !window_.jobs().busy(); }, 20000));
 }
 
 // One key, one meaning; and the sheet has them all.
