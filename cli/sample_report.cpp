@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include "deep/ops/sample.h"
@@ -13,12 +14,6 @@ namespace fathom::cli {
 namespace {
 
 using nlohmann::json;
-
-// As few digits as tell a float from its neighbours.
-json valueJson(float value) {
-  if (!std::isfinite(value)) return fmt::format("{}", std::isnan(value) ? std::abs(value) : value);
-  return std::stod(fmt::format("{}", value));
-}
 
 double alphaOf(const std::vector<deep::SampleLight>& light) {
   double alpha = 0;
@@ -72,6 +67,14 @@ Table columnsOf(const deep::DeepImage& image, size_t first, const std::vector<de
 }
 
 }  // namespace
+
+json valueJson(float value) {
+  const std::string text = fmt::format("{}", std::isnan(value) ? std::abs(value) : value);
+  if (!std::isfinite(value)) return text;
+  double digits = 0;
+  std::from_chars(text.data(), text.data() + text.size(), digits);  // which no locale changes
+  return digits;
+}
 
 std::vector<std::string> sampleTable(const deep::DeepImage& image, int x, int y) {
   const std::vector<deep::SampleLight> light = deep::lightOf(image, x, y);

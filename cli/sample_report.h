@@ -14,8 +14,11 @@ namespace fathom::cli {
 // what there is to tell of each, beside one another. Errors are those of deep::lightOf.
 std::vector<std::string> sampleTable(const deep::DeepImage& image, int x, int y);
 
-// {x, y, alpha, samples: [{channels: {NAME: value}, seen, front}]}; values that are not finite are the strings "nan",
-// "inf" and "-inf".
+// A number with as few digits as tell a FLOAT from its neighbours; one that is not finite is the string "nan", "inf" or
+// "-inf".
+nlohmann::json valueJson(float value);
+
+// {x, y, alpha, samples: [{channels: {NAME: value}, seen, front}]}, values as valueJson gives them.
 nlohmann::json sampleJson(const deep::DeepImage& image, int x, int y);
 
 }  // namespace fathom::cli

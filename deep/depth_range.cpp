@@ -65,6 +65,13 @@ Fragment RangeCut::part(const Range& whole, double alpha, double begin, double e
   return {range, part.alpha, part.weight};
 }
 
+bool RangeCut::leavesAnything(const Range& sample) const {
+  if (leavesWhole(sample)) return true;
+  if (leavesNothing(sample)) return false;
+  std::array<Fragment, 2> parts;
+  return !cut(sample, 0, parts).empty();
+}
+
 std::span<const Fragment> RangeCut::cut(const Range& sample, double alpha, std::array<Fragment, 2>& parts) const {
   size_t count = 0;
   const auto add = [&](double begin, double end) {

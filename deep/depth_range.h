@@ -44,6 +44,9 @@ class RangeCut {
   bool leavesWhole(const Range& sample) const { return inverted_ ? isFarOutside(sample) : isWellInside(sample); }
   bool leavesNothing(const Range& sample) const { return inverted_ ? isWellInside(sample) : isFarOutside(sample); }
 
+  // Whether cut() leaves something of a sample, whatever its alpha.
+  bool leavesAnything(const Range& sample) const;
+
   // What is left, front to back: nothing, one part, or two, which is only so where inverted. `parts` is where it lies.
   std::span<const Fragment> cut(const Range& sample, double alpha, std::array<Fragment, 2>& parts) const;
 

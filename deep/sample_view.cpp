@@ -24,15 +24,13 @@ struct Depths {
   }
 };
 
-// What is left of a sample's alpha; nothing where nothing of the sample is.
-std::optional<double> remaining(const RangeCut& cut, const Range& sample, double alpha) {
+// What is left of a sample's alpha.
+double remaining(const RangeCut& cut, const Range& sample, double alpha) {
   if (cut.leavesWhole(sample)) return alpha;
-  if (cut.leavesNothing(sample)) return {};
+  if (cut.leavesNothing(sample)) return 0;
   std::array<Fragment, 2> parts;
-  const std::span<const Fragment> left = cut.cut(sample, alpha, parts);
-  if (left.empty()) return {};
   double passing = 1;
-  for (const Fragment& part : left) passing *= 1 - part.alpha;
+  for (const Fragment& part : cut.cut(sample, alpha, parts)) passing *= 1 - part.alpha;
   return 1 - passing;
 }
 
@@ -60,7 +58,7 @@ uint64_t mostSeenOf(const std::vector<size_t>& order, const Depths& depths, std:
   double most = 0, passing = 1;
   for (const size_t i : order) {
     if (passing <= most) break;  // nothing behind is seen more
-    const double left = remaining(cut, depths.range(i), opacity(alpha[i])).value_or(0);
+    const double left = remaining(cut, depths.range(i), opacity(alpha[i]));
     if (left * passing > most) most = left * passing, best = i;
     passing *= 1 - left;
   }
@@ -95,7 +93,7 @@ Buffer<uint32_t> countSamples(const DeepImage& image, const Box& box, int step, 
   const RangeCut cut(range);
   forPixels(image, box, step, [&](size_t to, size_t pixel) {
     for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
-      if (remaining(cut, depths.range(i), 0)) ++result[to];
+      if (cut.leavesAnything(depths.range(i))) ++result[to];
   });
   return result;
 }
@@ -112,7 +110,7 @@ Buffer<uint8_t> findNonFinite(const DeepImage& image, const Box& box, int step, 
   Buffer<uint8_t> result(pixelsOf(box, step), 0);
   forPixels(image, box, step, [&](size_t to, size_t pixel) {
     for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
-      if (isSpoiled(i) && remaining(cut, depths.range(i), 0)) result[to] = 1;
+      if (isSpoiled(i) && cut.leavesAnything(depths.range(i))) result[to] = 1;
   });
   return result;
 }
@@ -123,7 +121,7 @@ std::optional<float> nearestDepth(const DeepImage& image, int x, int y) {
   const size_t pixel = image.dataWindow.index(x, y);
   std::optional<float> nearest;
   for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
-    if (alpha[i] > 0 && !std::isnan(z[i]) && (!nearest || z[i] < *nearest)) nearest = z[i];
+    if (alpha[i] > 0 && std::isfinite(z[i]) && (!nearest || z[i] < *nearest)) nearest = z[i];
   return nearest;
 }
 

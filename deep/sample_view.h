@@ -31,7 +31,7 @@ Buffer<uint32_t> countSamples(const DeepImage& image, const Box& box, int step, 
 Buffer<uint8_t> findNonFinite(const DeepImage& image, const Box& box, int step, const DepthRange& range,
                               const std::vector<std::string>& channels);
 
-// Where the nearest sample with alpha of a pixel begins. Throws Error where A or Z is missing.
+// Where the nearest sample with alpha of a pixel begins, of those at finite depths. Throws Error where A or Z is missing.
 std::optional<float> nearestDepth(const DeepImage& image, int x, int y);
 
 }  // namespace fathom::deep

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <QApplication>
+#include <clocale>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError&) {
   }
   QApplication application(argc, argv);
+  std::setlocale(LC_NUMERIC, "C");  // which the line above has changed
   QApplication::setApplicationName("fathom-view");
   QApplication::setOrganizationName("fathom");
   CLI11_PARSE(options, argc, argv);

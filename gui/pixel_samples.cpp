@@ -95,13 +95,4 @@ PixelSamples samplesAt(const PicturePtr& picture, QPoint pixel, const std::strin
   return result;
 }
 
-bool isShown(const deep::Range& range, const deep::DepthRange& clip) {
-  const bool behindNear = range.isPoint() ? range.z >= clip.near : range.zBack > clip.near;
-  const bool beforeFar = range.z < clip.far || std::isinf(clip.far);
-  if (!clip.inverted) return behindNear && beforeFar;
-  const bool endsInside =
-      range.zBack < clip.far || std::isinf(clip.far) || (!range.isPoint() && range.zBack == clip.far);
-  return !(range.z >= clip.near && endsInside);
-}
-
 }  // namespace fathom::gui

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "deep/clip_view.h"
 #include "deep/volume.h"
 #include "gui/picture.h"
 
@@ -40,8 +39,5 @@ QColor displayColour(double r, double g, double b, float stops);
 
 // Empty outside of the data window. `stops`: exposure of the colours.
 PixelSamples samplesAt(const PicturePtr& picture, QPoint pixel, const std::string& layer, float stops);
-
-// Whether anything of those depths is shown.
-bool isShown(const deep::Range& range, const deep::DepthRange& clip);
 
 }  // namespace fathom::gui

@@ -34,6 +34,11 @@ Cell cellOf(const PixelSamples& samples, const std::string& channel, int row) {
   return {nullptr, from.values[i]};
 }
 
+// Names of channels may hold any bytes.
+QString textOf(const nlohmann::json& json) {
+  return QString::fromStdString(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
 }  // namespace
 
 std::vector<SampleModel::Column> SampleModel::columnsOf(const Picture& picture) {
@@ -117,7 +122,7 @@ QVariant SampleModel::data(const QModelIndex& index, int role) const {
     case kSortRole:
       return value(index.row(), column);
     case Qt::ForegroundRole:
-      if (!samples_.isDeep() || isShown(sample.range, clip_)) return {};
+      if (!samples_.isDeep() || deep::RangeCut(clip_).leavesAnything(sample.range)) return {};
       return QApplication::palette().color(QPalette::Disabled, QPalette::Text);
     case Qt::BackgroundRole: {
       if (index.row() != highlight_) return {};
@@ -215,16 +220,14 @@ QString SampleModel::json(const std::vector<int>& rows) const {
     json all = cli::sampleJson(*image, x, y), chosen = json::array();
     for (const int row : rows) chosen.push_back(all["samples"][size_t(row)]);
     all["samples"] = chosen;
-    return QString::fromStdString(all.dump(2));
+    return textOf(all);
   }
   json channels = json::object();
   for (const Column& column : columns_) {
     if (column.kind != Kind::Channel || rows.empty()) continue;
-    const float value = cellOf(samples_, column.name, 0).value;
-    channels[column.name] =
-        std::isfinite(value) ? json(std::stod(fmt::format("{}", value))) : json(number(value, true).toStdString());
+    channels[column.name] = cli::valueJson(cellOf(samples_, column.name, 0).value);
   }
-  return QString::fromStdString(json{{"x", x}, {"y", y}, {"channels", channels}}.dump(2));
+  return textOf({{"x", x}, {"y", y}, {"channels", channels}});
 }
 
 bool SampleOrder::lessThan(const QModelIndex& left, const QModelIndex& right) const {

@@ -5,6 +5,7 @@
 #include <QSortFilterProxyModel>
 #include <vector>
 
+#include "deep/depth_range.h"
 #include "gui/pixel_samples.h"
 
 namespace fathom::gui {

@@ -100,6 +100,10 @@ TEST(SampleView, NearestDepthIsOfASampleWithAlpha) {
   EXPECT_EQ(nearestDepth(image, 3, -2), 4);
   EXPECT_EQ(nearestDepth(image, 4, -2), std::nullopt);
   EXPECT_EQ(nearestDepth(image, 99, 0), std::nullopt);
+  const float infinity = std::numeric_limits<float>::infinity();
+  const DeepImage sky = makeDeep({{{infinity, infinity, 1}}, {{-infinity, 1, 1}, {7, 7, 1}}}, 2);
+  EXPECT_EQ(nearestDepth(sky, 3, -2), std::nullopt);
+  EXPECT_EQ(nearestDepth(sky, 4, -2), 7);
 }
 
 TEST(SampleView, AMissingChannelIsNamed) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <clocale>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -116,6 +117,8 @@ TEST(SampleModel, GreysWhatIsClippedAway) {
   EXPECT_EQ(greyed({.near = 3}), "--+");               // none of it
   EXPECT_EQ(greyed({.near = 1, .far = 2.5f, .inverted = true}), "-++");
   EXPECT_EQ(greyed({.near = 2, .far = 3, .inverted = true}), "+-+");
+  EXPECT_EQ(greyed({.near = 1, .far = 7, .soft = 1}), "-++");  // where the fade begins nothing is left
+  EXPECT_EQ(greyed({.near = 0.5f, .far = 6, .soft = 1, .inverted = true}), "+--");  // what fades is on both sides
 }
 
 TEST(SampleModel, ColoursAreNotPremultiplied) {
@@ -156,6 +159,27 @@ TEST(SampleModel, JsonHoldsTheChosenSamples) {
   EXPECT_EQ(json["samples"][0]["channels"]["Z"], 5);
   EXPECT_EQ(json["samples"][1]["channels"]["id"], 4294967295u);
   EXPECT_EQ(json["samples"][1]["seen"], 0.25);
+}
+
+// As QApplication chooses the locale of the user.
+TEST(SampleModel, JsonDoesNotFollowTheLocale) {
+  const std::string before = std::setlocale(LC_NUMERIC, nullptr);
+  if (!std::setlocale(LC_NUMERIC, "de_DE.UTF-8") && !std::setlocale(LC_NUMERIC, "fr_FR.UTF-8"))
+    GTEST_SKIP() << "neither a German nor a French locale is installed";
+  SampleModel model;
+  show(model, kThree);
+  const std::string text = model.json({0}).toStdString();
+  std::setlocale(LC_NUMERIC, before.c_str());
+  EXPECT_EQ(nlohmann::json::parse(text)["samples"][0]["channels"]["A"], 0.25);
+}
+
+TEST(SampleModel, JsonTakesNamesThatAreNotUtf8) {
+  deep::DeepImage image = makeDeep({kThree}, 1);
+  image.add("caf\xe9", deep::PixelType::Float).values.fill(0.5f);
+  SampleModel model;
+  model.show(samplesAt(makePicture("a.exr", std::move(image)), kPixel, "RGBA", 0));
+  const auto json = nlohmann::json::parse(model.json({0}).toStdString());
+  EXPECT_EQ(json["samples"][0]["channels"]["caf\ufffd"], 0.5);
 }
 
 TEST(SampleModel, AFlatPixelIsOneRow) {
