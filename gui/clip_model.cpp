@@ -17,7 +17,8 @@ constexpr double kSecondsThrough = 4.0;  // of a sweep, one way
 }  // namespace
 
 void ClipModel::setWhole(const deep::DepthAxis& whole) {
-  if (!isZoomed() || whole.logarithmic != whole_.logarithmic) shown_ = whole;
+  const bool isLeft = shown_.near < whole.far && shown_.far > whole.near;
+  if (!isZoomed() || !isLeft || whole.logarithmic != whole_.logarithmic) shown_ = whole;
   whole_ = whole;
 }
 
@@ -102,7 +103,8 @@ ClipSweep::ClipSweep(const deep::DepthAxis& whole, const deep::DepthRange& start
       end_(1),
       moveNear_(start.near != -kInfinity || start.far == kInfinity),
       moveFar_(start.far != kInfinity) {
-  const double near = axis_.place(double(start.near)), far = axis_.place(double(start.far));
+  const double near = std::clamp(axis_.place(double(start.near)), 0.0, 1.0);
+  const double far = std::clamp(axis_.place(double(start.far)), 0.0, 1.0);
   if (moveNear_ && moveFar_) {
     width_ = far - near;
     end_ = std::max(0.0, 1 - width_);

@@ -17,7 +17,7 @@ class ClipModel {
   const deep::DepthAxis& shown() const { return shown_; }  // the part that is looked at
   bool isZoomed() const { return !(shown_ == whole_); }
 
-  // What is shown stays as it is, if it was a part; what was all becomes all again.
+  // What is shown stays as it is, if it was a part and some of it is left; what was all becomes all again.
   void setWhole(const deep::DepthAxis& whole);
   // The part becomes `factor` times as long, with the depth at `place` where it is; never longer than all.
   void zoom(double place, double factor);

@@ -120,6 +120,13 @@ TEST(ClipModel, APartStaysShownWhereThePictureChanges) {
   EXPECT_FALSE(model.isZoomed());
 }
 
+TEST(ClipModel, APartThatIsNotThereAnyMoreGivesWayToAll) {
+  ClipModel model = modelOf({0, 10});
+  model.show({5, 6});
+  model.setWhole({100, 200});
+  EXPECT_EQ(model.shown(), (deep::DepthAxis{100, 200}));
+}
+
 TEST(ClipSweep, GoesThroughAllDepthsAndBack) {
   const ClipSweep sweep({0, 10}, {});
   EXPECT_FLOAT_EQ(sweep.at(0).near, 0);
@@ -142,6 +149,19 @@ TEST(ClipSweep, BeginsWhereThePlanesAreAndKeepsTheSlab) {
   EXPECT_FLOAT_EQ(far.at(0).far, 4);
   EXPECT_GT(far.at(0.5).far, 4);
   EXPECT_EQ(far.at(0.5).near, -kInfinity);
+}
+
+// Depths that are not positive have no place on a logarithmic axis.
+TEST(ClipSweep, ASlabThatBeginsBeforeALogarithmicAxisStaysFinite) {
+  for (const float near : {-1.0f, 0.0f, 1e-30f}) {
+    const ClipSweep sweep({1, 100, true}, {near, 10});
+    for (const double seconds : {0.0, 1.0, 3.5, 6.0}) {
+      const deep::DepthRange range = sweep.at(seconds);
+      EXPECT_GE(range.near, 0.999f) << near << " at " << seconds;
+      EXPECT_LE(range.far, 100.1f) << near << " at " << seconds;
+      EXPECT_NEAR(range.far / range.near, 10, 1e-3);
+    }
+  }
 }
 
 }  // namespace
