@@ -22,11 +22,16 @@ InfoBar::InfoBar(Session& session, QWidget* parent) : QWidget(parent), session_(
   setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Fixed);
   setMinimumWidth(0);
   for (const auto change : {&Session::picturesChanged, &Session::viewChanged, &Session::pixelChanged})
-    connect(&session_, change, this, [this] { update(); });
+    connect(&session_, change, this, &InfoBar::follow);
 }
 
 QSize InfoBar::sizeHint() const {
   return {400, fontMetrics().height() + 2 * kAbove};
+}
+
+void InfoBar::follow() {
+  line_.reset();
+  update();
 }
 
 void InfoBar::setZoom(double zoom) {
@@ -65,6 +70,7 @@ QString InfoBar::text() const {
 void InfoBar::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   painter.fillRect(rect(), palette().window());
+  if (!line_) line_ = text();
   const QRect inside = rect().adjusted(kSides, 0, -kSides, 0);
   const QString zoom =
       zoom_ >= 0.1 ? QString("%1 %").arg(100 * zoom_, 0, 'f', 0) : QString("%1 %").arg(100 * zoom_, 0, 'f', 1);
@@ -72,7 +78,7 @@ void InfoBar::paintEvent(QPaintEvent*) {
   painter.drawText(inside, Qt::AlignRight | Qt::AlignVCenter, zoom);
   const QRect left = inside.adjusted(0, 0, -fontMetrics().horizontalAdvance(zoom) - 2 * kSides, 0);
   painter.drawText(left, Qt::AlignLeft | Qt::AlignVCenter,
-                   fontMetrics().elidedText(text(), Qt::ElideRight, left.width()));
+                   fontMetrics().elidedText(*line_, Qt::ElideRight, left.width()));
 }
 
 }  // namespace fathom::gui

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <QWidget>
+#include <optional>
 
 #include "gui/session.h"
 
@@ -24,10 +25,12 @@ class InfoBar : public QWidget {
   void paintEvent(QPaintEvent* event) override;
 
  private:
+  void follow();
   QString valuesOf(const PicturePtr& picture, QPoint pixel) const;
 
   Session& session_;
   double zoom_ = 1;
+  std::optional<QString> line_;  // what was painted last; none where it has to be found anew
 };
 
 }  // namespace fathom::gui

@@ -109,6 +109,7 @@ void PlacePanel::addControl(const char* name, const QString& label, const QStrin
   connect(control.slider, &QSlider::valueChanged, this,
           [this, member, value = control.value](int at) { change(member, value(double(at) / kSteps)); });
   connect(control.number, &QDoubleSpinBox::valueChanged, this, [this, member](double value) { change(member, value); });
+  connect(control.number, &QAbstractSpinBox::editingFinished, control.number, &QWidget::clearFocus);
   all_.push_back(std::move(control));
 }
 

@@ -104,6 +104,10 @@ void PlaybackBar::makeControls() {
   repeat_->setToolTip(tr("At the end"));
   repeat_->addItems({tr("Loop"), tr("Ping-pong"), tr("Once")});  // in the order of Repeat
   addWidget(repeat_);
+  for (QWidget* control : std::initializer_list<QWidget*>{frame_, fps_, repeat_})
+    control->setFocusPolicy(Qt::ClickFocus);
+  for (QAbstractSpinBox* number : std::initializer_list<QAbstractSpinBox*>{frame_, fps_})  // keys belong to the picture
+    connect(number, &QAbstractSpinBox::editingFinished, number, &QWidget::clearFocus);
   connect(frame_, &QSpinBox::valueChanged, this, [this](int frame) {
     player_.stop();
     player_.setFrame(frame);

@@ -12,21 +12,12 @@
 
 namespace fathom::gui {
 
-// Its actions have no keys; whoever makes the menus gives them some.
+// Its actions have no keys: those are the menus'.
 class PlaybackBar : public QToolBar {
   Q_OBJECT
 
  public:
   explicit PlaybackBar(Frames& frames, QWidget* parent = nullptr);
-
-  QAction* firstAction() const { return first_; }
-  QAction* previousAction() const { return previous_; }
-  QAction* playAction() const { return play_; }
-  QAction* nextAction() const { return next_; }
-  QAction* lastAction() const { return last_; }
-  QAction* inAction() const { return in_; }        // the current frame is the first that is played
-  QAction* outAction() const { return out_; }      // and the last
-  QAction* clearAction() const { return clear_; }  // all are
 
  protected:
   void changeEvent(QEvent* event) override;

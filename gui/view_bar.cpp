@@ -34,6 +34,24 @@ QStringList namesOf(const std::vector<Layer>& layers) {
   return names;
 }
 
+std::vector<std::string> namesIn(const QComboBox& choice) {
+  std::vector<std::string> names;
+  for (int i = 0; i < choice.count(); ++i) names.push_back(choice.itemData(i).toString().toStdString());
+  return names;
+}
+
+// Without zeros at the end.
+class NumberBox : public QDoubleSpinBox {
+ public:
+  QString textFromValue(double value) const override {
+    QString text = QDoubleSpinBox::textFromValue(value);
+    if (!text.contains(locale().decimalPoint())) return text;
+    while (text.endsWith(locale().zeroDigit())) text.chop(1);
+    if (text.endsWith(locale().decimalPoint())) text.chop(locale().decimalPoint().size());
+    return text;
+  }
+};
+
 }  // namespace
 
 ViewBar::ViewBar(Session& session, std::shared_ptr<const Display> display, QWidget* parent)
@@ -50,11 +68,11 @@ ViewBar::ViewBar(Session& session, std::shared_ptr<const Display> display, QWidg
           [this](const QString& name) { change([&](ViewState& view) { view.layer = name.toStdString(); }); });
   addIsolation();
   addSeparator();
-  addNumber("Exposure", "Exposure in stops, before the display transform", -20, 20, &DisplayParams::exposure);
-  addNumber("Gamma", "Gamma, after the display transform", 0.1, 5, &DisplayParams::gamma);
+  addNumber("Exposure", "Exposure in stops, before the display transform", -20, 20, 2, &DisplayParams::exposure);
+  addNumber("Gamma", "Gamma, after the display transform", 0.1, 5, 2, &DisplayParams::gamma);
   const QList<QAction*> low = addNumber("From", "Where the false colours begin; as high as To: where the values do",
-                                        -1e9, 1e9, &DisplayParams::low);
-  const QList<QAction*> high = addNumber("To", "Where the false colours end", -1e9, 1e9, &DisplayParams::high);
+                                        -1e9, 1e9, 6, &DisplayParams::low);
+  const QList<QAction*> high = addNumber("To", "Where the false colours end", -1e9, 1e9, 6, &DisplayParams::high);
   followers_.append([this, ends = low + high](const ViewState& view) {
     for (QAction* action : ends) action->setVisible(hasFalseColours(session_.a(), view));
   });
@@ -107,18 +125,19 @@ void ViewBar::addIsolation() {
   }
 }
 
-QList<QAction*> ViewBar::addNumber(const QString& label, const QString& tip, double low, double high,
+QList<QAction*> ViewBar::addNumber(const QString& label, const QString& tip, double low, double high, int decimals,
                                    float DisplayParams::*member) {
-  auto* number = new QDoubleSpinBox;
+  auto* number = new NumberBox;
   number->setRange(low, high);
   number->setSingleStep(0.25);
-  number->setDecimals(2);
+  number->setDecimals(decimals);
   number->setToolTip(tip);
   number->setKeyboardTracking(false);
   number->setFocusPolicy(Qt::ClickFocus);
   const QList<QAction*> actions = {addWidget(new QLabel(label)), addWidget(number)};
   connect(number, &QDoubleSpinBox::valueChanged, this,
           [this, member](double value) { change([&](ViewState& view) { view.display.*member = float(value); }); });
+  connect(number, &QAbstractSpinBox::editingFinished, number, &QWidget::clearFocus);  // keys belong to the picture
   followers_.append([number, member](const ViewState& view) {
     const QSignalBlocker quiet(number);
     number->setValue(double(view.display.*member));
@@ -138,10 +157,13 @@ void ViewBar::addChoice(const QString& tip, std::string DisplayParams::*member,
   });
   followers_.append([=](const ViewState& view) {
     const QSignalBlocker quiet(choice);
-    choice->clear();
-    for (const std::string& name : names()) {
-      const QString text = QString::fromStdString(name);
-      choice->addItem(name.empty() ? "No look" : text, text);
+    const std::vector<std::string> wanted = names();
+    if (wanted != namesIn(*choice)) {
+      choice->clear();
+      for (const std::string& name : wanted) {
+        const QString text = QString::fromStdString(name);
+        choice->addItem(name.empty() ? "No look" : text, text);
+      }
     }
     choice->setCurrentIndex(std::max(0, choice->findData(QString::fromStdString(view.display.*member))));
     action->setVisible(choice->count() > 1);

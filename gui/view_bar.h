@@ -31,7 +31,7 @@ class ViewBar : public QToolBar {
   void stepLayer(int by);
   void addIsolation();
   // Returns what can be hidden.
-  QList<QAction*> addNumber(const QString& label, const QString& tip, double low, double high,
+  QList<QAction*> addNumber(const QString& label, const QString& tip, double low, double high, int decimals,
                             float DisplayParams::*member);
   // One of `names()`, the first of which is the default; hidden where there is no choice.
   void addChoice(const QString& tip, std::string DisplayParams::*member,

@@ -76,6 +76,24 @@ TEST_F(ViewBarTest, ADisplayBringsItsOwnViews) {
   EXPECT_EQ(views->count(), int(display.views(display.displays()[1]).size()));
 }
 
+TEST_F(ViewBarTest, ChoicesAreListedAnewOnlyWhereTheyChange) {
+  auto* displays = bar_.findChildren<QComboBox*>()[1];
+  QSignalSpy listed(displays->model(), &QAbstractItemModel::rowsInserted);
+  bar_.changeExposure(1);
+  EXPECT_EQ(listed.size(), 0);
+}
+
+TEST_F(ViewBarTest, SmallEndsOfFalseColoursAreSeen) {
+  auto* from = bar_.findChildren<QDoubleSpinBox*>()[2];
+  ViewState view = session_.view();
+  view.display.low = 0.00125f;
+  session_.setView(view);
+  EXPECT_EQ(from->text(), QLocale().toString(0.00125, 'f', 5));
+  view.display.low = 20;
+  session_.setView(view);
+  EXPECT_EQ(from->text(), "20");
+}
+
 TEST_F(ViewBarTest, TheEndsOfFalseColoursShowWithThem) {
   auto* from = bar_.findChildren<QDoubleSpinBox*>()[2];
   const auto shown = [&] {
