@@ -13,6 +13,7 @@ namespace fathom::gui {
 namespace {
 
 constexpr int kPartRole = Qt::UserRole;  // the length of a cell's bar, of 1
+constexpr size_t kMostBins = 1000;       // that are listed
 
 // A bar behind the number.
 class BarDelegate : public QStyledItemDelegate {
@@ -91,40 +92,51 @@ void BoxPanel::showEvent(QShowEvent*) {
 }
 
 void BoxPanel::follow() {
-  const PicturePtr& picture = session_.a();
-  if (!picture || !session_.box()) {
-    box_.reset();
-    return say(tr("Drag a box in the picture with the shift key held: what its pixels have in common stands here."));
-  }
-  if (!picture->deep()) return say(tr("A flat picture has no bins."));
-  const std::string& layer = session_.view().layer;
-  if (!isVisible() || (asked_ == picture && box_ == session_.box() && layer_ == layer)) return;
-  if (asked_ != picture) job_.clear();
-  asked_ = picture;
-  box_ = session_.box();
-  layer_ = layer;
-  const float stops = session_.view().display.exposure;
-  job_.run([this, picture, box = *box_, layer, stops](const Progress&) {
-    const deep::BoxStatistics found =
-        deep::boxStatistics(*picture->deep(), box, three(colourChannels(*picture, layer)));
-    return [this, found, stops] { show(found, stops); };
+  const PicturePtr& picture = session_.seen();
+  if (!picture || !session_.box())
+    return forget(tr("Drag a box in the picture with the shift key held: what its pixels have in common stands here."));
+  if (!picture->deep()) return forget(tr("A flat picture has no bins."));
+  if (!isVisible()) return;
+  const Request request{picture, *session_.box(), session_.view().layer};
+  if (request == requested_) return describe();
+  if (requested_ && requested_->picture != picture) job_.clear();
+  requested_ = request;
+  job_.run([this, request](const Progress&) {
+    const deep::BoxStatistics found = deep::boxStatistics(*request.picture->deep(), request.box,
+                                                          three(colourChannels(*request.picture, request.layer)));
+    return [this, found] { show(found); };
   });
 }
 
-void BoxPanel::say(const QString& text) {
+void BoxPanel::forget(const QString& why) {
   job_.clear();
-  asked_.reset();
+  requested_.reset();
+  say(why);
+}
+
+void BoxPanel::say(const QString& text) {
+  shown_.reset();
   summary_->setText(text.toHtmlEscaped());
   counts_->setVisible(false);
   bins_->setVisible(false);
 }
 
-void BoxPanel::show(const deep::BoxStatistics& statistics, float stops) {
-  const deep::Statistics& counts = statistics.counts;
-  const Box& box = statistics.box;
-  if (counts.pixels == 0) return say(tr("The box lies outside of the picture."));
-  const auto& colour = statistics.colour;
-  const QString swatch = displayColour(colour[0], colour[1], colour[2], stops).name();
+void BoxPanel::show(const deep::BoxStatistics& statistics) {
+  if (statistics.counts.pixels == 0) return say(tr("The box lies outside of the picture."));
+  shown_ = statistics;
+  describe();
+  showCounts();
+  showBins();
+  emit ready();
+}
+
+// Again where the exposure changes.
+void BoxPanel::describe() {
+  if (!shown_) return;
+  const deep::Statistics& counts = shown_->counts;
+  const Box& box = shown_->box;
+  const auto& colour = shown_->colour;
+  const QString swatch = displayColour(colour[0], colour[1], colour[2], session_.view().display.exposure).name();
   QString text = tr("<b>%1 x %2</b> pixels at %3 %4<br>").arg(box.width()).arg(box.height()).arg(box.x0).arg(box.y0);
   text += tr("<b>%1</b> bins, %2 a pixel, %3 at most, at %4 %5<br>")
               .arg(counts.samples)
@@ -135,14 +147,13 @@ void BoxPanel::show(const deep::BoxStatistics& statistics, float stops) {
   if (counts.nearest <= counts.farthest)
     text += tr("depth <b>%1</b> to <b>%2</b><br>").arg(number(double(counts.nearest)), number(double(counts.farthest)));
   text += tr("mean <span style='color:%1'>&#9632;</span> %2 %3 %4, alpha %5")
-              .arg(swatch, number(colour[0]), number(colour[1]), number(colour[2]), number(statistics.alpha));
+              .arg(swatch, number(colour[0]), number(colour[1]), number(colour[2]), number(shown_->alpha));
+  if (shown_->bins.size() > kMostBins) text += tr("<br>The first %1 bins:").arg(kMostBins);
   summary_->setText(text);
-  showCounts(counts);
-  showBins(statistics);
-  emit ready();
 }
 
-void BoxPanel::showCounts(const deep::Statistics& counts) {
+void BoxPanel::showCounts() {
+  const deep::Statistics& counts = shown_->counts;
   counts_->setRowCount(0);
   for (size_t bucket = 0; bucket < counts.histogram.size(); ++bucket) {
     if (counts.histogram[bucket] == 0) continue;
@@ -156,13 +167,13 @@ void BoxPanel::showCounts(const deep::Statistics& counts) {
   counts_->setVisible(true);
 }
 
-void BoxPanel::showBins(const deep::BoxStatistics& statistics) {
+void BoxPanel::showBins() {
   double energy = 0;
-  for (const deep::BinStatistics& bin : statistics.bins) energy += bin.energy;
-  bins_->setRowCount(int(statistics.bins.size()));
+  for (const deep::BinStatistics& bin : shown_->bins) energy += bin.energy;
+  bins_->setRowCount(int(std::min(shown_->bins.size(), kMostBins)));
   for (int row = 0; row < bins_->rowCount(); ++row) {
-    const deep::BinStatistics& bin = statistics.bins[size_t(row)];
-    const double pixels = double(bin.pixels) / double(statistics.counts.pixels);
+    const deep::BinStatistics& bin = shown_->bins[size_t(row)];
+    const double pixels = double(bin.pixels) / double(shown_->counts.pixels);
     const double part = energy > 0 ? bin.energy / energy : 0;
     setCell(bins_, row, 0, QString::number(row));
     setCell(bins_, row, 1, percent(pixels), pixels);

@@ -4,6 +4,9 @@
 #include <QLabel>
 #include <QTableWidget>
 
+#include <optional>
+#include <string>
+
 #include "deep/box_statistics.h"
 #include "gui/background.h"
 #include "gui/session.h"
@@ -23,16 +26,24 @@ class BoxPanel : public QWidget {
   void showEvent(QShowEvent* event) override;
 
  private:
+  // All that the numbers depend on.
+  struct Request {
+    PicturePtr picture;
+    Box box;
+    std::string layer;
+    bool operator==(const Request&) const = default;
+  };
   void follow();
+  void forget(const QString& why);
   void say(const QString& text);
-  void show(const deep::BoxStatistics& statistics, float stops);
-  void showBins(const deep::BoxStatistics& statistics);
-  void showCounts(const deep::Statistics& counts);
+  void show(const deep::BoxStatistics& statistics);
+  void describe();
+  void showBins();
+  void showCounts();
 
   Session& session_;
-  PicturePtr asked_;  // of what the numbers are
-  std::optional<Box> box_;
-  std::string layer_;
+  std::optional<Request> requested_;
+  std::optional<deep::BoxStatistics> shown_;
   QLabel* summary_;
   QTableWidget *counts_, *bins_;
   Background job_;

@@ -23,7 +23,7 @@ constexpr double kStep = 0.005;         // of the axis: a key or a notch of the 
 constexpr size_t kMostMarks = 4096;
 
 // The depths of the samples of a pixel.
-std::vector<deep::Range> samplesAt(const deep::DeepImage& image, QPoint pixel) {
+std::vector<deep::Range> depthsAt(const deep::DeepImage& image, QPoint pixel) {
   std::vector<deep::Range> result;
   if (!image.dataWindow.contains(pixel.x(), pixel.y())) return result;
   const std::span<const float> z = image.tryGet("Z"), zBack = image.tryGet("ZBack");
@@ -67,6 +67,7 @@ DepthPanel::DepthPanel(Session& session, QWidget* parent) : QWidget(parent), ses
   connect(&session_, &Session::viewChanged, this, &DepthPanel::followRange);
   connect(&session_, &Session::pixelChanged, this, &DepthPanel::followPixel);
   setEnabled(false);
+  animate_->setEnabled(false);
   followPicture();
   followRange();
 }
@@ -80,7 +81,6 @@ QAction* DepthPanel::addAction(QHBoxLayout* row, const QString& text, const QStr
   button->setFocusPolicy(Qt::NoFocus);
   connect(action, &QAction::toggled, button, [button](bool on) { light(*button, on); });
   row->addWidget(button);
-  actions_ << action;
   return action;
 }
 
@@ -165,15 +165,20 @@ void DepthPanel::move(ClipHandle handle, int steps) {
 }
 
 void DepthPanel::animate(bool on) {
-  if (on) {
-    sweep_.emplace(model_.whole(), range());
-    swept_ = range();
-    time_.start();
-    ticks_.start();
-  } else {
-    ticks_.stop();
-    sweep_.reset();
-  }
+  ticks_.stop();
+  sweep_.reset();
+  if (!on) return;
+  if (known_ == seen_)
+    startSweep();
+  else
+    requestHistogram();  // whose axis the sweep waits for
+}
+
+void DepthPanel::startSweep() {
+  sweep_.emplace(model_.whole(), range());
+  swept_ = range();
+  time_.start();
+  ticks_.start();
 }
 
 void DepthPanel::sweep() {
@@ -193,10 +198,11 @@ void DepthPanel::reset() {
 }
 
 void DepthPanel::followPicture() {
-  if (seen_ == session_.a()) return;
-  seen_ = session_.a();
+  if (seen_ == session_.seen()) return;
+  seen_ = session_.seen();
   const bool deep = seen_ && seen_->deep();
   setEnabled(deep);
+  animate_->setEnabled(deep);  // in menus, too
   if (!deep) {
     animate_->setChecked(false);
     background_.clear();
@@ -210,6 +216,7 @@ void DepthPanel::followPicture() {
 }
 
 void DepthPanel::followRange() {
+  followPicture();  // B alone may be shown now
   if (sweep_ && (range().near != swept_.near || range().far != swept_.far)) animate_->setChecked(false);
   near_->setValue(range().near);
   far_->setValue(range().far);
@@ -219,28 +226,36 @@ void DepthPanel::followRange() {
 }
 
 void DepthPanel::followPixel() {
-  const bool there = session_.a() && session_.a()->deep() && session_.pixel();
-  histogram_->setMarks(there ? samplesAt(*session_.a()->deep(), *session_.pixel()) : std::vector<deep::Range>());
+  const bool there = seen_ && seen_->deep() && session_.pixel();
+  histogram_->setMarks(there ? depthsAt(*seen_->deep(), *session_.pixel()) : std::vector<deep::Range>());
 }
 
-// The axis of all depths is found anew only where picture or scale are others than it was found for.
+void DepthPanel::showEvent(QShowEvent*) {
+  if (known_ != seen_) requestHistogram();
+}
+
+// Where somebody looks, or an animation needs the axis. The axis of all depths is found anew only where picture or scale
+// are others than it was found for.
 void DepthPanel::requestHistogram() {
-  const PicturePtr picture = session_.a();
+  const PicturePtr picture = seen_;
   if (!picture || !picture->deep()) return;
+  if (!isVisible() && !animate_->isChecked()) return known_.reset();
   const bool logarithmic = logDepth_->isChecked();
   const bool known = picture == known_ && logarithmic == knownLogarithmic_;
-  const bool zoomed = model_.isZoomed() && logarithmic == knownLogarithmic_;
   const auto weight = deep::DepthWeight(weight_->currentData().toInt());
-  background_.run([=, this, whole = model_.whole(), shown = model_.shown()](const Progress& progress) {
+  background_.run([=, this, model = model_](const Progress& progress) {
     const deep::DeepImage& image = *picture->deep();
-    const deep::DepthAxis all = known ? whole : deep::axisOf(image, logarithmic);
-    const deep::DepthAxis axis = zoomed ? shown : all;
+    const deep::DepthAxis all = known ? model.whole() : deep::axisOf(image, logarithmic);
+    ClipModel next = model;
+    next.setWhole(all);
+    const deep::DepthAxis axis = next.shown();
     std::vector<double> bins = deep::depthHistogram(image, axis, kBins, weight, progress.stop);
     return [=, this, bins = std::move(bins)] {
       known_ = picture;
       knownLogarithmic_ = logarithmic;
       model_.setWhole(all);
       histogram_->setHistogram(axis, bins);
+      if (animate_->isChecked() && !sweep_) startSweep();
       emit histogramChanged();
     };
   });

@@ -26,8 +26,6 @@ class DepthPanel : public QWidget {
  public:
   explicit DepthPanel(Session& session, QWidget* parent = nullptr);
 
-  // Invert, animate, reset, logarithmic depth, logarithmic counts: for menus and keys.
-  QList<QAction*> clipActions() const { return actions_; }
   QAction* animateAction() const { return animate_; }
   QAction* logDepthAction() const { return logDepth_; }
   QAction* logCountsAction() const { return logCounts_; }
@@ -35,6 +33,9 @@ class DepthPanel : public QWidget {
  signals:
   // A newer histogram is shown.
   void histogramChanged();
+
+ protected:
+  void showEvent(QShowEvent* event) override;
 
  private:
   QAction* addAction(QHBoxLayout* row, const QString& text, const QString& tip, bool checkable);
@@ -48,6 +49,7 @@ class DepthPanel : public QWidget {
   void edit(const deep::DepthRange& range);
   void move(ClipHandle handle, int steps);
   void animate(bool on);
+  void startSweep();
   void sweep();
   void reset();
 
@@ -62,9 +64,8 @@ class DepthPanel : public QWidget {
   DepthField *near_, *far_, *soft_;
   QAction *animate_, *invert_, *reset_, *logDepth_, *logCounts_;
   QComboBox* weight_;
-  QList<QAction*> actions_;
   PicturePtr seen_;   // the session's when it was looked at last
-  PicturePtr known_;  // that the axis of all depths is of
+  PicturePtr known_;  // that histogram and axis of all depths are of
   bool knownLogarithmic_ = false;
   std::optional<ClipSweep> sweep_;
   deep::DepthRange swept_;  // what the animation set last

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "deep/ops/sample.h"
 #include "gui/depth_painting.h"
@@ -176,18 +177,19 @@ void DepthPlot::paintBars(QPainter& painter) const {
   }
 }
 
-void DepthPlot::paintTransmittance(QPainter& painter) const {
+void DepthPlot::paintTransmittance(QPainter& painter) {
   if (!samples_.problem.isEmpty()) return;
   const QRectF area = frame();
   const double step = 1 / devicePixelRatioF();
-  std::vector<float> depths;
-  const int steps = int(area.width() / step);
-  for (int i = 0; i <= steps; ++i) depths.push_back(float(axis_.depth(i * step / area.width())));
-  const std::vector<double> passing =
-      deep::passingTo(*samples_.picture->deep(), samples_.pixel.x(), samples_.pixel.y(), depths);
+  const Curve curve{samples_.picture, samples_.pixel, axis_, int(area.width() / step)};
+  if (std::exchange(curve_, curve) != curve) {
+    std::vector<float> depths;
+    for (int i = 0; i <= curve.steps; ++i) depths.push_back(float(axis_.depth(i * step / area.width())));
+    passing_ = deep::passingTo(*samples_.picture->deep(), samples_.pixel.x(), samples_.pixel.y(), depths);
+  }
   QPainterPath path;
-  for (size_t i = 0; i < passing.size(); ++i) {
-    const QPointF at(area.left() + double(i) * step, yOf(passing[i]));
+  for (size_t i = 0; i < passing_.size(); ++i) {
+    const QPointF at(area.left() + double(i) * step, yOf(passing_[i]));
     if (i == 0)
       path.moveTo(at);
     else

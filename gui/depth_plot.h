@@ -1,9 +1,10 @@
 // One pixel over depth: its samples as bars in their colours, outlined up to alpha and filled up to what is seen of them;
-// the transmittance falling from front to back; what is clipped away dimmed. The wheel
-// looks closer, a double click shows all.
+// the transmittance falling from front to back; what is clipped away dimmed. The wheel looks closer, a double click
+// shows all.
 #pragma once
 
 #include <QWidget>
+#include <vector>
 
 #include "deep/clip_view.h"
 #include "deep/depth_axis.h"
@@ -39,16 +40,26 @@ class DepthPlot : public QWidget {
   void leaveEvent(QEvent* event) override;
 
  private:
+  // All that the line of the transmittance depends on.
+  struct Curve {
+    PicturePtr picture;
+    QPoint pixel;
+    deep::DepthAxis axis;
+    int steps = 0;
+    bool operator==(const Curve&) const = default;
+  };
   void fitAxis();
   double xOf(double depth) const;
   double yOf(double value) const;
   int sampleAt(const QPointF& at) const;
   void paintAxes(QPainter& painter) const;
   void paintBars(QPainter& painter) const;
-  void paintTransmittance(QPainter& painter) const;
+  void paintTransmittance(QPainter& painter);
   void paintCaption(QPainter& painter) const;
 
   PixelSamples samples_;
+  Curve curve_;                  // that was drawn last
+  std::vector<double> passing_;  // its values
   deep::DepthRange clip_;
   deep::DepthAxis whole_, axis_;  // around all samples, and what is shown of it
   bool logarithmic_ = false;

@@ -51,16 +51,13 @@ QImage sliceImage(const flat::Image& slice, float stops) {
 DepthSlice::DepthSlice(Session& session, QWidget* parent) : QWidget(parent), session_(session) {
   setMinimumHeight(120);
   setMouseTracking(true);
-  connect(&session_, &Session::picturesChanged, this, [this] {
-    job_.clear();
-    row_.reset();
-    requested_.reset();
-    shown_.reset();
-    axis_.reset();
-    follow();
-  });
+  connect(&session_, &Session::picturesChanged, this, &DepthSlice::follow);
   connect(&session_, &Session::viewChanged, this, &DepthSlice::follow);
-  connect(&job_, &Background::failed, &session_, &Session::say);
+  connect(&job_, &Background::failed, this, [this](const QString& line) {
+    shown_.reset();
+    update();
+    session_.say(line);
+  });
 }
 
 QSize DepthSlice::sizeHint() const {
@@ -74,18 +71,25 @@ void DepthSlice::setLogarithmic(bool logarithmic) {
 }
 
 std::optional<DepthSlice::Request> DepthSlice::wanted() {
-  const PicturePtr& picture = session_.a();
+  const PicturePtr& picture = session_.seen();
   const std::optional<QPoint> pixel = session_.pixel();
   if (!picture || !picture->deep() || !isVisible()) return {};
   const Box& window = picture->dataWindow();
+  if (window_ != window) {
+    window_ = window;
+    x0_ = window.x0;
+    x1_ = window.x1;
+    row_.reset();
+    axis_.reset();
+  }
   if (pixel && pixel->y() >= window.y0 && pixel->y() < window.y1) row_ = pixel->y();
   if (!row_) return {};
   const int cells = std::clamp(int(frame().height() / kCell), 16, 1024);
   return Request{picture,
                  colourChannels(*picture, session_.view().layer),
                  *row_,
-                 window_ == window ? x0_ : window.x0,
-                 window_ == window ? x1_ : window.x1,
+                 x0_,
+                 x1_,
                  cells,
                  logarithmic_,
                  axis_,
@@ -103,14 +107,20 @@ DepthSlice::Answer DepthSlice::answer(Request request) {
   return {std::move(request), whole, axis, std::move(picture)};
 }
 
+void DepthSlice::forget() {
+  job_.clear();
+  requested_.reset();
+  shown_.reset();
+}
+
 void DepthSlice::follow() {
   update();
+  const PicturePtr& picture = session_.seen();
+  const bool isOther = requested_ && requested_->picture != picture;
+  if (!picture || !picture->deep() || (isOther && !isVisible())) forget();
   const std::optional<Request> request = wanted();
   if (!request || request == requested_) return;
   requested_ = request;
-  x0_ = request->x0;
-  x1_ = request->x1;
-  window_ = request->picture->dataWindow();
   job_.run([this, request = *request](const Progress&) {
     auto made = std::make_shared<Answer>(answer(request));
     return [this, made] {
@@ -138,8 +148,8 @@ void DepthSlice::paintEvent(QPaintEvent*) {
   if (!shown_) {
     painter.setPen(between(palette(), 0.5));
     painter.drawText(rect(), Qt::AlignCenter,
-                     session_.a() && !session_.a()->deep() ? tr("A flat picture has no depth.")
-                                                           : tr("The row under the cursor, seen from above."));
+                     session_.seen() && !session_.seen()->deep() ? tr("A flat picture has no depth.")
+                                                                 : tr("The row under the cursor, seen from above."));
     return;
   }
   paintAxes(painter);

@@ -1,5 +1,5 @@
 // The row of the picture through the inspected pixel, seen from above: columns across, depth upwards from the camera.
-// Computed in the background. The wheel looks closer, with Ctrl in depth; a double click shows all.
+// Computed in the background; the last one stays until the next is there. The wheel looks closer, with Ctrl in depth; a double click shows all.
 #pragma once
 
 #include <QImage>
@@ -12,8 +12,9 @@
 
 namespace fathom::gui {
 
-// A slice as it is drawn, far rows on top; transparent where nothing is. Thin smoke is lifted: opacity is the cube
-// root of the alpha that a cell would have were it an eighth of the axis long. Colours (the first three planes; grey without) are those of the things themselves, `stops` brighter.
+// A slice as it is drawn, far rows on top; transparent where nothing is. Thin smoke is lifted: opacity is the cube root
+// of the alpha that a cell would have were it an eighth of the axis long. Colours (the first three planes; grey without)
+// are those of the things themselves, `stops` brighter.
 QImage sliceImage(const flat::Image& slice, float stops);
 
 class DepthSlice : public QWidget {
@@ -62,6 +63,7 @@ class DepthSlice : public QWidget {
   };
   static Answer answer(Request request);
   std::optional<Request> wanted();
+  void forget();
   void setColumns(double x0, double x1);
   void paintAxes(QPainter& painter) const;
   void paintCaption(QPainter& painter) const;
@@ -73,8 +75,8 @@ class DepthSlice : public QWidget {
   std::optional<int> row_;  // the last that was inspected
   std::optional<Request> requested_;
   std::optional<Answer> shown_;
+  Box window_;           // that row, columns and axis were chosen for
   int x0_ = 0, x1_ = 0;  // columns to show
-  Box window_;           // that they were chosen for
   std::optional<deep::DepthAxis> axis_;
   std::optional<QPointF> mouse_;
   Background job_;

@@ -90,10 +90,6 @@ FrameJobs::FrameJobs(Session& session, Frames& frames, Jobs& jobs, QObject* pare
           [this](const QString& name) { session_.say(tr("%1: stopped").arg(name)); });
 }
 
-const PicturePtr& FrameJobs::seen() const {
-  return session_.view().comparison == Comparison::B && session_.b() ? session_.b() : session_.a();
-}
-
 bool FrameJobs::canDenoise() {
   const bool can = frames_.a() && frames_.a()->made.isEmpty() && frames_.originalA();
   if (!can) session_.say(tr("Open a noisy render as A to denoise it"));
@@ -157,7 +153,7 @@ void FrameJobs::addSaving(const QString& path, const std::function<void(const st
 }
 
 void FrameJobs::saveFlattened(const QString& path) {
-  const PicturePtr picture = seen();
+  const PicturePtr picture = session_.seen();
   if (!picture) return;
   addSaving(path, [picture, range = session_.view().clip](const std::string& to) {
     flat::write(to, flattenSeen(*picture, range));
@@ -165,7 +161,7 @@ void FrameJobs::saveFlattened(const QString& path) {
 }
 
 void FrameJobs::saveDeep(const QString& path) {
-  const PicturePtr picture = seen();
+  const PicturePtr picture = session_.seen();
   if (!picture) return;
   addSaving(path, [picture, range = session_.view().clip](const std::string& to) {
     if (!picture->deep()) fail("{}: expected a deep image to save its samples, found a flat one", picture->path);

@@ -25,8 +25,6 @@ class FrameJobs : public QObject {
 
   // Bytes that denoising may take.
   void setMemory(size_t bytes) { memory_ = bytes; }
-  // Of A, B where that alone is shown; null: nothing is open.
-  const PicturePtr& seen() const;
 
  public slots:
   // The file of A, as `fathom denoise` does it; the result comes as B.

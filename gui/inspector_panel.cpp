@@ -1,15 +1,24 @@
 #include "gui/inspector_panel.h"
 
+#include <QFileInfo>
 #include <QHBoxLayout>
 #include <QMenu>
 #include <QSplitter>
 #include <QVBoxLayout>
+#include <utility>
 
 namespace fathom::gui {
 
 namespace {
 
-constexpr int kSoon = 12;  // milliseconds
+constexpr int kSoon = 12;              // milliseconds
+constexpr size_t kManySamples = 2000;  // from where on the window would wait for them
+
+size_t countAt(const PicturePtr& picture, const std::optional<QPoint>& pixel) {
+  const deep::DeepImage* image = picture ? picture->deep() : nullptr;
+  if (!image || !pixel || !image->dataWindow.contains(pixel->x(), pixel->y())) return 0;
+  return image->count(image->dataWindow.index(pixel->x(), pixel->y()));
+}
 
 QToolButton* makeButton(QAction* action, QWidget* parent) {
   auto* button = new QToolButton(parent);
@@ -23,8 +32,8 @@ QToolButton* makeButton(QAction* action, QWidget* parent) {
 InspectorPanel::InspectorPanel(Session& session, QWidget* parent)
     : QWidget(parent),
       session_(session),
-      unpin_(tr("Unpin")),
-      logarithmic_(tr("Log depth")),
+      unpin_(tr("Unpin"), this),
+      logarithmic_(tr("Log depth"), this),
       place_(new QLabel(this)),
       state_(new QLabel(this)),
       tabs_(new QTabWidget(this)),
@@ -86,6 +95,7 @@ InspectorPanel::InspectorPanel(Session& session, QWidget* parent)
   connect(&unpin_, &QAction::triggered, this, [this] { session_.setPin({}); });
   connect(&logarithmic_, &QAction::toggled, plot_, &DepthPlot::setLogarithmic);
   connect(&logarithmic_, &QAction::toggled, slice_, &DepthSlice::setLogarithmic);
+  connect(&reader_, &Background::failed, &session_, &Session::say);
   connect(table_, &SampleTable::failed, &session_, &Session::say);
   connect(table_, &SampleTable::hovered, this, &InspectorPanel::highlight);
   connect(plot_, &DepthPlot::hovered, this, [this](int sample) {
@@ -95,17 +105,34 @@ InspectorPanel::InspectorPanel(Session& session, QWidget* parent)
   followView();
 }
 
+PixelSamples InspectorPanel::answer(const Request& request) {
+  if (request.pixel) return samplesAt(request.picture, *request.pixel, request.layer, request.stops);
+  PixelSamples none;
+  none.picture = request.picture;
+  return none;
+}
+
 void InspectorPanel::follow() {
   soon_.stop();
-  PixelSamples samples;
-  if (const std::optional<QPoint> pixel = session_.pixel())
-    samples = samplesAt(session_.a(), *pixel, session_.view().layer, session_.view().display.exposure);
-  else
-    samples.picture = session_.a();
-  describe(samples);
+  const ViewState& view = session_.view();
+  Request request{session_.seen(), session_.pixel(), view.layer, view.display.exposure};
+  if (std::exchange(shown_, request) != request) {
+    reader_.clear();
+    if (countAt(request.picture, request.pixel) <= kManySamples)
+      showSamples(answer(request));
+    else
+      reader_.run([this, request = std::move(request)](const Progress&) {
+        return [this, samples = answer(request)] { showSamples(samples); };
+      });
+  }
+  describe();
+  slice_->follow();
+}
+
+void InspectorPanel::showSamples(PixelSamples samples) {
   plot_->show(samples);
   table_->samples().show(std::move(samples));
-  slice_->follow();
+  describe();
 }
 
 void InspectorPanel::followView() {
@@ -119,24 +146,30 @@ void InspectorPanel::highlight(int sample) {
   table_->samples().setHighlight(sample);
 }
 
-void InspectorPanel::describe(const PixelSamples& samples) {
+void InspectorPanel::describe() {
+  const PixelSamples& samples = table_->samples().samples();
   const std::optional<QPoint> pixel = session_.pixel();
   unpin_.setEnabled(session_.pin().has_value());
   unpinButton_->setVisible(unpin_.isEnabled());
   place_->setText(
       pixel ? QString("<b>%1 %2</b>%3").arg(pixel->x()).arg(pixel->y()).arg(session_.pin() ? tr(" pinned") : QString())
             : tr("no pixel"));
-  QString state;
-  if (!samples.problem.isEmpty())
-    state = samples.problem;
+  QStringList state;
+  if (samples.picture != shown_.picture || (pixel && samples.pixel != *pixel))
+    state << tr("reading %1 samples").arg(countAt(shown_.picture, pixel));
+  else if (!samples.problem.isEmpty())
+    state << samples.problem;
+  else if (samples.isDeep() && pixel && samples.samples.empty())
+    state << tr("empty");
   else if (samples.isDeep() && pixel)
-    state = samples.samples.empty()
-                ? tr("empty")
-                : tr("%1, alpha %2")
-                      .arg(samples.samples.size() == 1 ? tr("1 sample") : tr("%1 samples").arg(samples.samples.size()))
-                      .arg(samples.alpha(), 0, 'g', 3);
-  state_->setText(state);
-  state_->setToolTip(state);
+    state << tr("%1, alpha %2")
+                 .arg(samples.samples.size() == 1 ? tr("1 sample") : tr("%1 samples").arg(samples.samples.size()))
+                 .arg(samples.alpha(), 0, 'g', 3);
+  if (session_.a() && session_.b())
+    state << QString("%1: %2").arg(session_.seen() == session_.b() ? "B" : "A",
+                                   QFileInfo(QString::fromStdString(session_.seen()->path)).fileName());
+  state_->setText(state.join("    "));
+  state_->setToolTip(state_->text());
 }
 
 }  // namespace fathom::gui

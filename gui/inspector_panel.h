@@ -7,6 +7,8 @@
 #include <QTabWidget>
 #include <QTimer>
 #include <QToolButton>
+#include <optional>
+#include <string>
 
 #include "gui/box_panel.h"
 #include "gui/depth_plot.h"
@@ -31,10 +33,20 @@ class InspectorPanel : public QWidget {
   void showTab(Tab tab) { tabs_->setCurrentIndex(int(tab)); }
 
  private:
+  // All that the samples and their colours depend on.
+  struct Request {
+    PicturePtr picture;
+    std::optional<QPoint> pixel;
+    std::string layer;
+    float stops = 0;
+    bool operator==(const Request&) const = default;
+  };
+  static PixelSamples answer(const Request& request);
   void follow();
   void followView();
+  void showSamples(PixelSamples samples);
   void highlight(int sample);
-  void describe(const PixelSamples& samples);
+  void describe();
 
   Session& session_;
   QAction unpin_, logarithmic_;
@@ -46,6 +58,8 @@ class InspectorPanel : public QWidget {
   SampleTable* table_;
   DepthSlice* slice_;
   BoxPanel* box_;
+  Request shown_;      // or asked for
+  Background reader_;  // of pixels with many samples
 };
 
 }  // namespace fathom::gui

@@ -71,7 +71,7 @@ void MainWindow::addFileMenu() {
         [this] { save("Save deep", "exr", [this](const QString& path) { frameJobs_.saveDeep(path); }); });
   addTo(menu, "Save as It Looks, as PNG…", {QKeySequence("Ctrl+P")}, this, [this] {
     save("Save as it looks", "png", [this](const QString& path) {
-      const RenderRequest request{session_.a(), session_.b(), session_.view(), frameJobs_.seen()->dataWindow()};
+      const RenderRequest request{session_.a(), session_.b(), session_.view(), session_.seen()->dataWindow()};
       frameJobs_.savePng(path, [request, display = display_, wipe = canvas_->wipeColumn()] {
         return joined(Compositor(display).make(request, 1), wipe);
       });
@@ -97,6 +97,7 @@ void MainWindow::addViewMenu() {
   menu->addSeparator();
   inspector_->unpinAction()->setShortcut(QKeySequence("Escape"));
   menu->addAction(inspector_->unpinAction());
+  menu->addActions({inspector_->copyTsvAction(), inspector_->copyJsonAction()});
 }
 
 void MainWindow::addDepthMenu() {
@@ -199,7 +200,7 @@ void MainWindow::open(const QString& title, void (Frames::*take)(const QString&)
 
 void MainWindow::save(const QString& title, const QString& suffix,
                       const std::function<void(const QString& path)>& write) {
-  if (!frameJobs_.seen()) {
+  if (!session_.seen()) {
     session_.say("Nothing is open yet");
     return;
   }

@@ -19,7 +19,7 @@ constexpr int kSwatch = 14;
 }  // namespace
 
 SampleTable::SampleTable(QWidget* parent)
-    : QTableView(parent), copyTsv_(tr("Copy as &TSV")), copyJson_(tr("Copy as &JSON")) {
+    : QTableView(parent), copyTsv_(tr("Copy as &TSV"), this), copyJson_(tr("Copy as &JSON"), this) {
   order_.setSourceModel(&model_);
   setModel(&order_);
   setSortingEnabled(true);

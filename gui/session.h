@@ -22,6 +22,8 @@ class Session : public QObject {
 
   const PicturePtr& a() const { return a_; }  // null before anything is open
   const PicturePtr& b() const { return b_; }  // what A is compared with; null: nothing
+  // What is looked at in numbers: B where it alone is shown, else A.
+  const PicturePtr& seen() const { return view_.comparison == Comparison::B && b_ ? b_ : a_; }
   const ViewState& view() const { return view_; }
   // In pixels of the image.
   std::optional<QPoint> cursor() const { return cursor_; }

@@ -1,5 +1,6 @@
 #include "deep/ops/sample.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "deep/channels.h"
@@ -42,19 +43,22 @@ std::vector<SampleLight> lightOf(const DeepImage& image, int x, int y) {
   return light;
 }
 
-// Whatever overlaps whatever: optical depths of merged samples add up.
+// Whatever overlaps whatever: optical depths of merged samples add up. `behind` gathers, at the first depth behind a
+// sample, what all depths from there on have in front of them.
 std::vector<double> passingTo(const DeepImage& image, int x, int y, std::span<const float> depths) {
   const size_t pixel = pixelAt(image.dataWindow, x, y);
   const std::span<const float> alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");
-  std::vector<double> passing(depths.size(), 0);  // optical depths at first
+  std::vector<double> passing(depths.size(), 0), behind(depths.size() + 1, 0);  // optical depths at first
   for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i) {
     const Range range = usableRange(z[i], zBack.empty() ? z[i] : zBack[i]);
     const double depth = opticalDepth(opacity(alpha[i])), length = double(range.zBack) - double(range.z);
-    for (size_t d = 0; d < depths.size(); ++d)
-      if (depths[d] > range.z)
-        passing[d] += depths[d] >= range.zBack ? depth : depth * ((double(depths[d]) - double(range.z)) / length);
+    const size_t begin = size_t(std::ranges::upper_bound(depths, range.z) - depths.begin());
+    const size_t end = std::max(begin, size_t(std::ranges::lower_bound(depths, range.zBack) - depths.begin()));
+    for (size_t d = begin; d < end; ++d) passing[d] += depth * ((double(depths[d]) - double(range.z)) / length);
+    behind[end] += depth;
   }
-  for (double& value : passing) value = std::exp(-value);
+  double sum = 0;
+  for (size_t d = 0; d < depths.size(); ++d) passing[d] = std::exp(-(passing[d] + (sum += behind[d])));
   return passing;
 }
 

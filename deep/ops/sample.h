@@ -19,8 +19,8 @@ struct SampleLight {
 // where A or Z is missing and where the pixel is outside of the data window.
 std::vector<SampleLight> lightOf(const DeepImage& image, int x, int y);
 
-// What passes through all that stands in front of each of these depths, points at that depth not included; inside of
-// volumes it falls exponentially. Throws Error where A or Z is missing and where the pixel is outside of the data window.
+// What passes through all that stands in front of each of these depths, which do not fall; points at that depth are not
+// included, and inside of volumes it falls exponentially. Throws Error where A or Z is missing and where the pixel is outside of the data window.
 std::vector<double> passingTo(const DeepImage& image, int x, int y, std::span<const float> depths);
 
 }  // namespace fathom::deep

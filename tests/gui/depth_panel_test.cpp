@@ -50,7 +50,7 @@ struct DepthPanelTest : ::testing::Test {
   }
   DepthField* field(const char* name) { return panel.findChild<DepthField*>(name); }
   QAction* action(const QString& text) {
-    for (QAction* one : panel.clipActions())
+    for (QAction* one : panel.findChildren<QAction*>())
       if (one->text() == text) return one;
     return nullptr;
   }
@@ -178,12 +178,61 @@ TEST_F(DepthPanelTest, BarsStandWhereSamplesAre) {
 }
 
 TEST_F(DepthPanelTest, ThePlanesColourTheBars) {
-  const auto grab = [&](const deep::DepthRange& range) {
+  const auto pixel = [&](const deep::DepthRange& range, double x) {
     setClip(range);
-    return view->grab().toImage();
+    const QImage image = view->grab().toImage();
+    return image.pixel(int(x * image.devicePixelRatio()), int(0.75 * view->height() * image.devicePixelRatio()));
   };
-  EXPECT_NE(grab({2, 6}), grab({3, 6}));
-  EXPECT_NE(grab({2, 6}), grab({2, 6, 0, true}));
+  // Within the bar at depth 1.
+  double x = view->xOf(1) - 3;
+  while (x < view->xOf(1) + 3 && pixel({}, x) == pixel({}, view->xOf(1.5))) ++x;
+  const auto bar = [&](const deep::DepthRange& range) { return pixel(range, x); };
+  const QRgb kept = bar({-kInfinity, 6}), removed = bar({4, 6});
+  EXPECT_NE(kept, removed);
+  EXPECT_EQ(bar({5, 6}), removed);
+  EXPECT_EQ(bar({4, 6, 0, true}), kept);
+}
+
+TEST_F(DepthPanelTest, WhereBAloneIsShownTheDepthsAreOfB) {
+  session.setB(pictureOf({100, 200}));
+  QSignalSpy shown(&panel, &DepthPanel::histogramChanged);
+  ViewState state = session.view();
+  state.comparison = Comparison::B;
+  session.setView(state);
+  ASSERT_TRUE(shown.wait());
+  EXPECT_GT(view->depthAt(40), 50);
+}
+
+TEST_F(DepthPanelTest, AHiddenPanelCountsNothing) {
+  QSignalSpy shown(&panel, &DepthPanel::histogramChanged);
+  panel.hide();
+  session.setA(pictureOf({100, 200}));
+  EXPECT_FALSE(shown.wait(50));
+  panel.show();
+  EXPECT_TRUE(shown.wait());
+  EXPECT_GT(view->depthAt(40), 50);
+}
+
+TEST_F(DepthPanelTest, AHiddenPanelAnimatesThroughTheDepthsOfThePicture) {
+  panel.hide();
+  session.setA(pictureOf({100, 200}));
+  action("Animate")->trigger();
+  EXPECT_TRUE(QTest::qWaitFor([&] { return clip().near > 90; }));
+}
+
+TEST_F(DepthPanelTest, WithoutDepthsNothingIsAnimated) {
+  EXPECT_TRUE(action("Animate")->isEnabled());
+  session.setA(nullptr);
+  EXPECT_FALSE(action("Animate")->isEnabled());
+}
+
+TEST_F(DepthPanelTest, APartOfOtherDepthsIsNotKept) {
+  const double x = view->xOf(4);
+  QWheelEvent wheel(QPointF(x, 30), view->mapToGlobal(QPointF(x, 30)), {}, {0, 240}, {}, {}, Qt::NoScrollPhase, false);
+  QCoreApplication::sendEvent(view, &wheel);
+  open({100, 200});
+  EXPECT_TRUE(QTest::qWaitFor([&] { return view->depthAt(40) > 50; }));
+  EXPECT_LT(view->depthAt(700), 300);
 }
 
 TEST_F(DepthPanelTest, AnotherPictureHasItsOwnDepths) {

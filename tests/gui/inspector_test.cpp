@@ -32,6 +32,19 @@ PicturePtr threeColours() {
   return makePicture("a.exr", std::move(image));
 }
 
+// Another one of the same size.
+PicturePtr oneSample() {
+  return makePicture("folder/b.exr", makeDeep({{{7, 7, 0.5f}}, {}, {}}, 3));
+}
+
+PicturePtr manySamples() {
+  std::vector<reference::Sample> samples;
+  for (int i = 0; i < 3000; ++i) samples.push_back({float(1 + i), float(1 + i), 0.001f});
+  deep::DeepImage image = makeDeep({samples, {}, {}}, 3);
+  image.add("G", deep::PixelType::Float);
+  return makePicture("many.exr", std::move(image));
+}
+
 class Inspector : public ::testing::Test {
  protected:
   Inspector() {
@@ -57,6 +70,16 @@ class Inspector : public ::testing::Test {
     QHeaderView* header = table->horizontalHeader();
     const QPoint at(header->sectionViewportPosition(columnOf(name)) + 8, header->height() / 2);
     QTest::mouseClick(header->viewport(), Qt::LeftButton, {}, at);
+  }
+  void showAlone(Comparison comparison) {
+    ViewState view = session.view();
+    view.comparison = comparison;
+    session.setView(view);
+  }
+  void setExposure(float stops) {
+    ViewState view = session.view();
+    view.display.exposure = stops;
+    session.setView(view);
   }
   QColor plotted(const QPointF& at) const { return plot->grab().toImage().pixelColor(at.toPoint()); }
 
@@ -213,6 +236,23 @@ TEST_F(Inspector, TheWheelLooksCloserAtTheSlice) {
   EXPECT_NEAR(slice->placeOf(3.5, 3).y(), other.y(), 1e-6);
 }
 
+TEST_F(Inspector, TheSliceKeepsZoomAndImageUntilTheNextPictureIsThere) {
+  QSignalSpy ready(slice, &DepthSlice::ready);
+  panel.showTab(InspectorPanel::Tab::Slice);
+  ASSERT_TRUE(!ready.empty() || ready.wait());
+  const QPointF at = slice->placeOf(3.5, 2.5);
+  QWheelEvent wheel(at, slice->mapToGlobal(at), {}, {0, 240}, {}, Qt::ControlModifier, Qt::NoScrollPhase, false);
+  QApplication::sendEvent(slice, &wheel);
+  ASSERT_TRUE(ready.wait());
+  const QPointF zoomed = slice->placeOf(3.5, 3);
+  const QImage before = slice->grab().toImage();
+  session.setPin({});
+  session.setA(threeColours());
+  EXPECT_EQ(slice->grab().toImage().pixelColor(at.toPoint()), before.pixelColor(at.toPoint()));
+  ASSERT_TRUE(ready.wait());
+  EXPECT_EQ(slice->placeOf(3.5, 3), zoomed);
+}
+
 TEST_F(Inspector, TheSliceFollowsTheClipWithoutANewOne) {
   QSignalSpy ready(slice, &DepthSlice::ready);
   panel.showTab(InspectorPanel::Tab::Slice);
@@ -241,6 +281,80 @@ TEST_F(Inspector, TheBoxInNumbers) {
   EXPECT_FALSE(tables[1]->isVisible());
 }
 
+TEST_F(Inspector, WhereBAloneIsShownAllIsOfB) {
+  QSignalSpy boxReady(box, &BoxPanel::ready), sliceReady(slice, &DepthSlice::ready);
+  const auto* state = panel.findChild<QLabel*>("state");
+  EXPECT_FALSE(state->text().contains("a.exr"));
+  session.setB(threeColours());
+  session.setA(oneSample());
+  EXPECT_EQ(table->model()->rowCount(), 1);
+  EXPECT_TRUE(state->text().contains("A: b.exr")) << state->text().toStdString();
+  showAlone(Comparison::B);
+  EXPECT_EQ(table->model()->rowCount(), 3);
+  EXPECT_TRUE(state->text().contains("B: a.exr")) << state->text().toStdString();
+  EXPECT_LT(plot->axis().far, 6);
+  panel.showTab(InspectorPanel::Tab::Slice);
+  ASSERT_TRUE(!sliceReady.empty() || sliceReady.wait());
+  const QImage image = slice->grab().toImage();
+  EXPECT_GT(image.pixelColor(slice->placeOf(3.5, 2.3).toPoint()).green(), 200);
+  panel.showTab(InspectorPanel::Tab::Box);
+  session.setBox(Box{3, -2, 6, -1});
+  ASSERT_TRUE(!boxReady.empty() || boxReady.wait());
+  EXPECT_EQ(box->findChildren<QTableWidget*>()[1]->rowCount(), 3);
+  showAlone(Comparison::A);
+  EXPECT_EQ(table->model()->rowCount(), 1);
+}
+
+TEST_F(Inspector, ManySamplesAreReadInTheBackgroundAndOnce) {
+  session.setA(manySamples());
+  EXPECT_EQ(table->model()->rowCount(), 3);
+  EXPECT_TRUE(panel.findChild<QLabel*>("state")->text().contains("reading 3000"));
+  ASSERT_TRUE(QTest::qWaitFor([this] { return table->model()->rowCount() == 3000; }));
+  EXPECT_TRUE(panel.findChild<QLabel*>("state")->text().startsWith("3000 samples"));
+  int read = 0;
+  QObject::connect(&table->samples(), &QAbstractItemModel::dataChanged,
+                   [&](const QModelIndex&, const QModelIndex&, const QList<int>& roles) { read += roles.isEmpty(); });
+  ViewState view = session.view();
+  view.clip.near = 100;
+  session.setView(view);
+  QTest::qWait(30);
+  EXPECT_EQ(read, 0);
+  setExposure(1);
+  EXPECT_TRUE(QTest::qWaitFor([&] { return read == 1; }));
+}
+
+TEST_F(Inspector, ABoxOfManyBinsListsTheFirst) {
+  QSignalSpy ready(box, &BoxPanel::ready);
+  panel.showTab(InspectorPanel::Tab::Box);
+  session.setBox(Box{3, -2, 6, -1});
+  session.setA(manySamples());
+  ASSERT_TRUE(QTest::qWaitFor([this] { return box->findChild<QLabel*>()->text().contains("3000"); }));
+  EXPECT_EQ(box->findChildren<QTableWidget*>()[1]->rowCount(), 1000);
+  EXPECT_TRUE(box->findChild<QLabel*>()->text().contains("first 1000"));
+}
+
+TEST_F(Inspector, TheMeanOfTheBoxFollowsTheExposure) {
+  QSignalSpy ready(box, &BoxPanel::ready);
+  panel.showTab(InspectorPanel::Tab::Box);
+  session.setBox(Box{3, -2, 6, -1});
+  ASSERT_TRUE(!ready.empty() || ready.wait());
+  const QString before = box->findChild<QLabel*>()->text();
+  setExposure(-2);
+  EXPECT_NE(box->findChild<QLabel*>()->text(), before);
+}
+
+TEST_F(Inspector, ABoxThatCannotBeReadIsTriedOnce) {
+  auto* summary = box->findChild<QLabel*>();
+  panel.showTab(InspectorPanel::Tab::Box);
+  session.setA(oneSample());  // without G
+  session.setBox(Box{3, -2, 6, -1});
+  ASSERT_TRUE(QTest::qWaitFor([&] { return summary->text().contains("G"); }));
+  summary->setText("as it was");
+  setExposure(1);
+  QTest::qWait(50);
+  EXPECT_EQ(summary->text(), "as it was");
+}
+
 TEST_F(Inspector, AFlatPictureHasNoBins) {
   flat::Image image{{0, 0, 9, 9}, {0, 0, 9, 9}, {}, {}};
   for (const char* name : {"A", "B", "G", "R"}) image.add(name, 0.25f);
@@ -248,10 +362,15 @@ TEST_F(Inspector, AFlatPictureHasNoBins) {
   session.setPin(QPoint(4, 4));
   session.setA(makePicture("b.exr", std::move(image)));
   EXPECT_EQ(table->model()->rowCount(), 1);
-  for (const auto tab : {InspectorPanel::Tab::Slice, InspectorPanel::Tab::Box, InspectorPanel::Tab::Samples}) {
-    panel.showTab(tab);
-    EXPECT_FALSE(panel.grab().isNull());
-  }
+  panel.showTab(InspectorPanel::Tab::Box);
+  EXPECT_TRUE(box->findChild<QLabel*>()->text().contains("no bins"));
+  for (const QTableWidget* numbers : box->findChildren<QTableWidget*>()) EXPECT_FALSE(numbers->isVisible());
+  panel.showTab(InspectorPanel::Tab::Slice);
+  QTest::mouseClick(slice, Qt::LeftButton, {}, slice->rect().center());  // there is no column
+  EXPECT_EQ(session.pin(), QPoint(4, 4));
+  panel.showTab(InspectorPanel::Tab::Samples);
+  QTest::mouseMove(plot, plot->rect().center());  // nor a bar
+  EXPECT_FALSE(table->model()->index(0, 0).data(Qt::BackgroundRole).isValid());
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <QAbstractSpinBox>
 #include <QApplication>
 #include <QDockWidget>
+#include <QDoubleSpinBox>
 #include <QDropEvent>
 #include <QFileInfo>
 #include <QLabel>
@@ -69,6 +71,29 @@ TEST_F(MainWindowTest, KeysOfTheView) {
   EXPECT_DOUBLE_EQ(canvas->zoom(), 2 * fitted);
   press(Qt::Key_F);
   EXPECT_DOUBLE_EQ(canvas->zoom(), fitted);
+}
+
+TEST_F(MainWindowTest, KeysBelongToThePictureAgainOnceANumberIsTyped) {
+  window_.activateWindow();
+  ASSERT_TRUE(QTest::qWaitForWindowActive(&window_));
+  const QList<QAbstractSpinBox*> numbers = window_.findChildren<QAbstractSpinBox*>();
+  ASSERT_GE(numbers.size(), 8);
+  for (QAbstractSpinBox* number : numbers) {
+    if (!number->isVisible() || !number->isEnabled()) continue;
+    number->setFocus();
+    ASSERT_TRUE(number->hasFocus()) << number->toolTip().toStdString();
+    QTest::keyClick(number, Qt::Key_Return);
+    EXPECT_FALSE(number->hasFocus()) << number->toolTip().toStdString();
+  }
+  auto* exposure = window_.findChildren<QDoubleSpinBox*>()[0];
+  exposure->setFocus();
+  exposure->selectAll();
+  QTest::keyClicks(exposure, "1.5");
+  QTest::keyClick(exposure, Qt::Key_Return);
+  EXPECT_EQ(view().display.exposure, 1.5f);
+  QWidget* focus = QApplication::focusWidget();
+  QTest::keyClick(focus ? focus : &window_, Qt::Key_R);
+  EXPECT_EQ(view().isolate, Isolate::Red);
 }
 
 TEST_F(MainWindowTest, KeysOfTheDepth) {
