@@ -3,6 +3,7 @@
 #include "deep/cluster.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <tuple>
 
@@ -71,8 +72,9 @@ void removePoisoned(const std::vector<Output>& outputs, size_t firstSample, Clus
 
 // Per bin, sums over the samples that have a say: of all and of each half.
 struct Totals {
-  std::vector<double> weight[3], squares;
-  std::vector<uint32_t> count[3];
+  std::array<std::vector<double>, 3> weight;
+  std::array<std::vector<uint32_t>, 3> count;
+  std::vector<double> squares;
 };
 constexpr size_t kAll = 2;
 
