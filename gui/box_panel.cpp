@@ -91,6 +91,12 @@ void BoxPanel::showEvent(QShowEvent*) {
   follow();
 }
 
+// A panel that nobody sees holds no picture.
+void BoxPanel::hideEvent(QHideEvent* event) {
+  QWidget::hideEvent(event);
+  requested_.reset();
+}
+
 void BoxPanel::follow() {
   const PicturePtr& picture = session_.seen();
   if (!picture || !session_.box())

@@ -24,6 +24,7 @@ class BoxPanel : public QWidget {
 
  protected:
   void showEvent(QShowEvent* event) override;
+  void hideEvent(QHideEvent* event) override;
 
  private:
   // All that the numbers depend on.

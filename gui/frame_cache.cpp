@@ -109,6 +109,12 @@ void FrameCache::forgetMade() {
   if (std::erase_if(entries_, [](const auto& of) { return !of.second.isFile; }) > 0) emit contentChanged();
 }
 
+void FrameCache::forgetFailures() {
+  std::erase_if(entries_, [this](const auto& of) {
+    return !of.second.picture && !of.second.failure.isEmpty() && of.first != reading_;
+  });
+}
+
 // The files on the screen, for one that is written in place, and their folders, for one that is replaced or appears.
 void FrameCache::watch() {
   QStringList paths;

@@ -41,6 +41,8 @@ class FrameCache : public QObject {
   // A picture that is not a file's, under a name that is none: it cannot be read again, and stays until forgetMade().
   void put(const std::string& name, PicturePtr picture);
   void forgetMade();
+  // What could not be read is tried again when it is wanted next.
+  void forgetFailures();
   // Reads the files on the screen again, and forgets others that have changed.
   void reload();
 

@@ -171,6 +171,7 @@ void Frames::open(const QString& path) {
   } catch (const std::exception& e) {
     return session_.say(QString::fromStdString(e.what()));
   }
+  cache_.forgetFailures();
   emit sourcesChanged();
   want();
   show();
@@ -184,6 +185,7 @@ void Frames::openB(const QString& path) {
   } catch (const std::exception& e) {
     return session_.say(QString::fromStdString(e.what()));
   }
+  cache_.forgetFailures();
   emit sourcesChanged();
   want();
   show();

@@ -26,9 +26,10 @@ struct Axis {
   // 1, 2 and 5 times the powers of ten that lie on the axis.
   std::vector<double> ticks() const {
     std::vector<double> result;
-    for (double power = std::pow(10, std::floor(std::log10(low))); power <= high; power *= 10)
-      for (const double tick : {power, 2 * power, 5 * power})
-        if (tick >= low && tick <= high) result.push_back(tick);
+    const int last = int(std::floor(std::log10(high)));
+    for (int exponent = int(std::floor(std::log10(low))); exponent <= last; ++exponent)
+      for (const int digit : {1, 2, 5})
+        if (const double tick = digit * std::pow(10, exponent); tick >= low && tick <= high) result.push_back(tick);
     return result;
   }
 };

@@ -12,7 +12,6 @@
 namespace fathom::cli {
 namespace {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 

@@ -333,6 +333,17 @@ TEST_F(Inspector, ABoxOfManyBinsListsTheFirst) {
   EXPECT_TRUE(box->findChild<QLabel*>()->text().contains("first 1000"));
 }
 
+TEST_F(Inspector, ABoxThatIsHiddenHoldsNoPicture) {
+  QSignalSpy ready(box, &BoxPanel::ready);
+  panel.showTab(InspectorPanel::Tab::Box);
+  session.setBox(Box{3, -2, 6, -1});
+  ASSERT_TRUE(ready.wait());
+  panel.showTab(InspectorPanel::Tab::Samples);
+  const std::weak_ptr<const Picture> before = session.a();
+  session.setA(makePicture("other.exr", before.lock()->deep()->copy()));
+  EXPECT_TRUE(QTest::qWaitFor([&] { return before.expired(); }));
+}
+
 TEST_F(Inspector, TheMeanOfTheBoxFollowsTheExposure) {
   QSignalSpy ready(box, &BoxPanel::ready);
   panel.showTab(InspectorPanel::Tab::Box);

@@ -52,9 +52,12 @@ TEST_F(MainWindowTest, TheTitleSaysWhatTheFileIs) {
 
 TEST_F(MainWindowTest, AnUnreadableFileIsALineAndThePictureStays) {
   const PicturePtr before = window_.session().a();
-  window_.frames().open("/nowhere/nothing.exr");
-  EXPECT_TRUE(QTest::qWaitFor([&] { return window_.statusBar()->currentMessage().contains("nothing.exr"); }, 20000));
-  EXPECT_EQ(window_.session().a(), before);
+  for (int time = 0; time < 2; ++time) {
+    window_.statusBar()->clearMessage();
+    window_.frames().open("/nowhere/nothing.exr");
+    EXPECT_TRUE(QTest::qWaitFor([&] { return window_.statusBar()->currentMessage().contains("nothing.exr"); }, 20000));
+    EXPECT_EQ(window_.session().a(), before);
+  }
 }
 
 TEST_F(MainWindowTest, KeysOfTheView) {

@@ -61,7 +61,7 @@ inline void fillPointers(deep::DeepImage& image, Pointers& pointers) {
 inline Imf::DeepFrameBuffer frameBuffer(deep::DeepImage& image, Pointers& pointers) {
   std::vector<deep::ChannelInfo> channels;
   for (const deep::Channel& c : image.channels) channels.push_back({c.name, c.type});
-  const Imf::DeepFrameBuffer buffer = frameBuffer(image.dataWindow, channels, pointers);
+  Imf::DeepFrameBuffer buffer = frameBuffer(image.dataWindow, channels, pointers);
   for (size_t i = 0; i < image.pixels(); ++i) pointers.counts[i] = unsigned(image.count(i));
   fillPointers(image, pointers);
   return buffer;
