@@ -16,7 +16,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 std::string newFolder(const std::string& name) {
-  const std::string folder = testing::TempDir() + "sequence_" + name + "_" + std::to_string(::getpid());
+  std::string folder = testing::TempDir() + "sequence_" + name + "_" + std::to_string(::getpid());
   std::filesystem::create_directories(folder);
   return folder;
 }
