@@ -1,5 +1,6 @@
 // The shared damaged files through info, flatten and denoise: an answer, or one line and exit status 1; no
 // crash, no hang, bounded memory, and no output where there is no answer.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -44,7 +45,7 @@ TEST_P(DamagedFiles, AreAnsweredOrRefusedInOneLine) {
   int refused = 0;
   for (const std::string& file : files) {
     const std::string output = folder / "out.exr";
-    const Ran ran = runFathom(std::string(GetParam()) + " '" + file + "' -o '" + output + "'", limited());
+    const Ran ran = runFathom(fmt::format("{} '{}' -o '{}'", GetParam(), file, output), limited());
     EXPECT_TRUE(ran.status == 0 || ran.status == 1) << file << " ends with " << ran.status << "\n" << ran.err;
     if (ran.status == 1) {
       ++refused;
