@@ -202,7 +202,7 @@ TEST(Cluster, HalvesAreBalancedAndMakeTheMean) {
         EXPECT_NEAR((n0[b] * c0[b] + n1[b] * c1[b]) / n[b], c[b], 1e-6 * double(c[b]));
         even += n0[b];
       }
-      EXPECT_EQ(even, float((spp + 1) / 2));
+      EXPECT_EQ(int(even), (spp + 1) / 2);
     }
   }
 }

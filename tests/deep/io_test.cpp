@@ -32,7 +32,6 @@ namespace {
 using reference::difference;
 using reference::randomDeep;
 using reference::readWithOpenExr;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 const std::vector<reference::NamedType> kAllTypes = {

@@ -102,8 +102,9 @@ inline RenderedFrame renderFrame(const FrameParams& p = {}) {
   }
   if (p.volumes) fill(frame.noisy, "ZBack", [](const auto& b) { return b.zBack; });
   fill(frame.noisy, "samples", [](const auto& b) { return float(b.samples); });
-  fill(frame.noisy, "half0.samples", [](const auto& b) { return float((b.samples + b.y % 2) / 2); });
-  fill(frame.noisy, "half1.samples", [](const auto& b) { return float(b.samples - (b.samples + b.y % 2) / 2); });
+  const auto firstHalf = [](const auto& b) { return (b.samples + b.y % 2) / 2; };
+  fill(frame.noisy, "half0.samples", [&](const auto& b) { return float(firstHalf(b)); });
+  fill(frame.noisy, "half1.samples", [&](const auto& b) { return float(b.samples - firstHalf(b)); });
   fill(frame.noisy, "variance.Z", [](const auto&) { return 1e-4f; });
   fill(frame.noisy, "crypto", [](const auto& b) { return 0.25f * float(b.x); });
   Buffer<uint32_t>& ids = frame.noisy.add("id", PixelType::Uint).ids;
