@@ -16,7 +16,6 @@ namespace fathom::deep {
 namespace {
 
 using reference::randomSamples;
-using reference::SampleParams;
 
 TEST(Merge, HoldsEverySampleOfEveryInputFrontToBack) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
