@@ -156,6 +156,10 @@ void Frames::setResult(const std::string& file, const QString& made, PicturePtr 
   source.made = made;
   cache_.put(file + " (" + made.toStdString() + ")", std::move(picture));
   b_ = std::move(source);
+  sourcesAreNew();
+}
+
+void Frames::sourcesAreNew() {
   emit sourcesChanged();
   want();
   show();
@@ -172,9 +176,7 @@ void Frames::open(const QString& path) {
     return session_.say(QString::fromStdString(e.what()));
   }
   cache_.forgetFailures();
-  emit sourcesChanged();
-  want();
-  show();
+  sourcesAreNew();
 }
 
 void Frames::openB(const QString& path) {
@@ -186,27 +188,21 @@ void Frames::openB(const QString& path) {
     return session_.say(QString::fromStdString(e.what()));
   }
   cache_.forgetFailures();
-  emit sourcesChanged();
-  want();
-  show();
+  sourcesAreNew();
 }
 
 void Frames::closeB() {
   if (!b_) return;
   b_.reset();
   setFrames(player_.frame());
-  emit sourcesChanged();
-  want();
-  show();
+  sourcesAreNew();
 }
 
 void Frames::swap() {
   if (!a_ || !b_) return;
   std::swap(a_, b_);
   setFrames(player_.frame());
-  emit sourcesChanged();
-  want();
-  show();
+  sourcesAreNew();
 }
 
 void Frames::reload() {

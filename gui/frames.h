@@ -87,6 +87,7 @@ class Frames : public QObject {
     int frame;
   };
   void setFrames(int frame);
+  void sourcesAreNew();
   void want();
   void show();
   void pass();

@@ -15,27 +15,11 @@ namespace fathom::deep {
 namespace {
 
 using reference::makeDeep;
+using reference::randomStack;
 using reference::Sample;
 using reference::samplesOf;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-// Points and volumes behind one another, opaque ones and empty pixels among them.
-DeepImage makeStack(unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> unit;
-  reference::Pixels pixels(24);
-  for (auto& pixel : pixels) {
-    float z = unit(random);
-    for (int n = int(random() % 6); n > 0; --n) {
-      const float length = random() % 2 ? unit(random) : 0;
-      const float alpha = random() % 4 ? unit(random) : 1;
-      pixel.push_back({z, z + length, alpha, alpha * unit(random), uint32_t(random())});
-      z += length + 0.1f + unit(random);
-    }
-  }
-  return makeDeep(pixels, 6);
-}
 
 TEST(Clip, RangesAreHalfOpen) {
   const DeepImage image = makeDeep({{{1, 1, 0.5f, 0.1f, 7}, {2, 2, 0.5f, 0.2f, 8}, {3, 3, 0.5f, 0.3f, 9}}}, 1);
@@ -66,7 +50,7 @@ TEST(Clip, AVolumeIsCutIntoPartsThatMakeTheWhole) {
 
 TEST(Clip, FrontOverBehindIsTheWhole) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
-    const DeepImage image = makeStack(seed);
+    const DeepImage image = randomStack(seed);
     const flat::Image whole = flatten(image);
     for (const float z : {0.0f, 0.7f, 1.3f, 2.0f, 3.1f, 50.0f}) {
       const flat::Image front = flatten(clip(image, -kInfinity, z)), behind = flatten(clip(image, z, kInfinity));
@@ -81,7 +65,7 @@ TEST(Clip, FrontOverBehindIsTheWhole) {
 }
 
 TEST(Clip, WhatIsNotCutPassesBitForBit) {
-  const DeepImage image = makeStack(3), all = clip(image, -kInfinity, kInfinity);
+  const DeepImage image = randomStack(3), all = clip(image, -kInfinity, kInfinity);
   ASSERT_EQ(all.samples(), image.samples());
   EXPECT_TRUE(std::ranges::equal(all.offsets, image.offsets));
   for (const Channel& channel : image.channels) {
@@ -111,7 +95,7 @@ TEST(Clip, PlanesAtInfinityCutNothing) {
 }
 
 TEST(Clip, IsTheSameForAnyBandOfRows) {
-  const DeepImage image = makeStack(5), whole = clip(image, 1, 2);
+  const DeepImage image = randomStack(5), whole = clip(image, 1, 2);
   for (int y = image.dataWindow.y0; y < image.dataWindow.y1; ++y)
     EXPECT_EQ(reference::difference(clip(rows(image, y, y + 1), 1, 2), rows(whole, y, y + 1)), "");
 }
@@ -124,7 +108,7 @@ flat::Image mapOf(const Box& window, float z) {
 
 TEST(ClipByMap, OfOneDepthIsClip) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
-    const DeepImage image = makeStack(seed);
+    const DeepImage image = randomStack(seed);
     const flat::Image map = mapOf({0, -4, 20, 20}, 1.7f);
     EXPECT_EQ(reference::difference(clipByMap(image, map, "depth", Side::Front), clip(image, -kInfinity, 1.7f)), "");
     EXPECT_EQ(reference::difference(clipByMap(image, map, "depth", Side::Behind), clip(image, 1.7f, kInfinity)), "");
@@ -132,7 +116,7 @@ TEST(ClipByMap, OfOneDepthIsClip) {
 }
 
 TEST(ClipByMap, LeavesPixelsWithoutADepthAsTheyAre) {
-  DeepImage image = makeStack(4);
+  DeepImage image = randomStack(4);
   flat::Image map = mapOf({3, -2, 5, 0}, 0.0f);
   map.planes[0].values[0] = std::numeric_limits<float>::quiet_NaN();
   map.planes[0].values[1] = kInfinity;

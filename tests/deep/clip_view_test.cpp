@@ -106,25 +106,9 @@ TEST(ClipView, OfAnyBoxAndStepTakesPixelsOfTheWhole) {
       }
 }
 
-// Points and volumes behind one another in one pixel each.
-DeepImage stack(unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> unit;
-  reference::Pixels pixels(24);
-  for (auto& pixel : pixels) {
-    float z = unit(random);
-    for (int n = int(random() % 6); n > 0; --n) {
-      const float length = random() % 2 ? unit(random) : 0, alpha = random() % 4 ? unit(random) : 1;
-      pixel.push_back({z, z + length, alpha, alpha * unit(random)});
-      z += length + 0.1f + unit(random);
-    }
-  }
-  return makeDeep(pixels, 6);
-}
-
 TEST(ClipView, BeforeOverRangeOverBehindIsTheWhole) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
-    const DeepImage image = stack(seed);
+    const DeepImage image = reference::randomStack(seed);
     const auto view = [&](const DepthRange& range) { return clipView(image, image.dataWindow, 1, range, {"R"}); };
     const flat::Image whole = view({}), before = view({-kInfinity, 0.75f}), range = view({0.75f, 2.5f}),
                       behind = view({2.5f, kInfinity}), removed = view({0.75f, 2.5f, 0, true});
@@ -140,7 +124,7 @@ TEST(ClipView, BeforeOverRangeOverBehindIsTheWhole) {
 }
 
 TEST(ClipView, SoftFadesTowardsTheHardPlane) {
-  const DeepImage image = stack(7);
+  const DeepImage image = reference::randomStack(7);
   const auto view = [&](float soft) { return clipView(image, image.dataWindow, 1, {0.8f, 2.1f, soft}, {"R"}); };
   expectNear(view(1e-7f), view(0), "nearly hard");
   float before = 0;
@@ -185,7 +169,7 @@ TEST(ClipView, HasTheSameBitsForAnyNumberOfThreads) {
 }
 
 TEST(ClipView, NamesTheChannelThatIsMissing) {
-  DeepImage image = stack(1);
+  DeepImage image = reference::randomStack(1);
   EXPECT_THROW(clipView(image, image.dataWindow, 1, {}, {"nothing"}), Error);
   EXPECT_THROW(clipView(image, image.dataWindow, 1, {}, {"id"}), Error);
   EXPECT_EQ(clipView(image, image.dataWindow, 1, {}, {"R", "R", "A"}).planes.size(), 2u);

@@ -1,6 +1,7 @@
 // Deep images written out sample by sample, for tests.
 #pragma once
 
+#include <random>
 #include <vector>
 
 #include "deep/image.h"
@@ -47,6 +48,23 @@ inline std::vector<Sample> samplesOf(const deep::DeepImage& image, size_t pixel)
   for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
     samples.push_back({z[i], zBack.empty() ? z[i] : zBack[i], alpha[i], colour[i], image.find("id")->ids[i]});
   return samples;
+}
+
+// Points and volumes behind one another, opaque ones and empty pixels among them.
+inline deep::DeepImage randomStack(unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit;
+  Pixels pixels(24);
+  for (auto& pixel : pixels) {
+    float z = unit(random);
+    for (int n = int(random() % 6); n > 0; --n) {
+      const float length = random() % 2 ? unit(random) : 0;
+      const float alpha = random() % 4 ? unit(random) : 1;
+      pixel.push_back({z, z + length, alpha, alpha * unit(random), uint32_t(random())});
+      z += length + 0.1f + unit(random);
+    }
+  }
+  return makeDeep(pixels, 6);
 }
 
 }  // namespace fathom::reference
