@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 
+#include "gui/false_colours.h"
+
 namespace fathom::gui {
 
 namespace {
@@ -22,10 +24,9 @@ constexpr std::array kIsolateChoices = {
     IsolateChoice{Isolate::Alpha, "A", "Alpha", "A"},        IsolateChoice{Isolate::Luminance, "L", "Luminance", "L"},
 };
 
-bool hasFalseColours(const PicturePtr& picture, const ViewState& view) {
+bool showsFalseColours(const PicturePtr& picture, const ViewState& view) {
   const Layer* layer = picture ? picture->layer(view.layer) : nullptr;
-  return layer && layer->kind != Layer::Kind::Colour && layer->kind != Layer::Kind::Vector &&
-         layer->kind != Layer::Kind::Identifier;
+  return layer && hasFalseColours(layer->kind);
 }
 
 QStringList namesOf(const std::vector<Layer>& layers) {
@@ -74,7 +75,7 @@ ViewBar::ViewBar(Session& session, std::shared_ptr<const Display> display, QWidg
                                         -1e9, 1e9, 6, &DisplayParams::low);
   const QList<QAction*> high = addNumber("To", "Where the false colours end", -1e9, 1e9, 6, &DisplayParams::high);
   followers_.append([this, ends = low + high](const ViewState& view) {
-    for (QAction* action : ends) action->setVisible(hasFalseColours(session_.a(), view));
+    for (QAction* action : ends) action->setVisible(showsFalseColours(session_.a(), view));
   });
   addChoice("Display", &DisplayParams::display, [this] { return display_->displays(); });
   addChoice("View of that display", &DisplayParams::view,
