@@ -1,0 +1,16 @@
+// NL-Means on flat images: the deep filter on one opaque bin per pixel, where it is the flat filter (Vicini et al.,
+// section 3.2), so that there is one code for both.
+#pragma once
+
+#include "deep/denoise.h"
+#include "flat/denoiser.h"
+
+namespace fathom::deep {
+
+// The plan for a flat image taken by itself: what it offers, and its mean colour.
+DenoisePlan planFlat(const flat::Image& image, const DenoiseParams& params);
+
+// The denoiser of such a plan.
+flat::Denoiser flatNlMeans(const DenoisePlan& plan);
+
+}  // namespace fathom::deep
