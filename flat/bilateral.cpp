@@ -18,6 +18,8 @@ namespace fathom::flat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+// kSquared: weights are squared in the sums, and the sums divided by the square of the sum of weights.
+template <bool kSquared>
 void BilateralRow(int y, int width, const BilateralParams& params, const uint8_t* wanted, std::span<const Padded> guide,
                   std::span<const Padded> in, std::span<Padded> out) {
   const hn::ScalableTag<float> d;
@@ -45,11 +47,24 @@ void BilateralRow(int y, int width, const BilateralParams& params, const uint8_t
             hn::NegMulAdd(distance, hn::Set(d, params.sharpness), hn::Set(d, fall * float(dx * dx + dy * dy)));
         const auto w = ExpNegative(d, exponent);
         weight = hn::Add(weight, w);
-        for (size_t i = 0; i < in.size(); ++i) sum[i] = hn::MulAdd(w, hn::LoadU(d, in[i].row(y + dy) + x + dx), sum[i]);
+        const auto part = kSquared ? hn::Mul(w, w) : w;
+        for (size_t i = 0; i < in.size(); ++i)
+          sum[i] = hn::MulAdd(part, hn::LoadU(d, in[i].row(y + dy) + x + dx), sum[i]);
       }
     }
-    for (size_t i = 0; i < in.size(); ++i) hn::StoreU(hn::Div(sum[i], weight), d, out[i].row(y) + x);
+    const auto whole = kSquared ? hn::Mul(weight, weight) : weight;
+    for (size_t i = 0; i < in.size(); ++i) hn::StoreU(hn::Div(sum[i], whole), d, out[i].row(y) + x);
   }
+}
+
+void BilateralMean(int y, int width, const BilateralParams& params, const uint8_t* wanted,
+                   std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out) {
+  BilateralRow<false>(y, width, params, wanted, guide, in, out);
+}
+
+void BilateralVariance(int y, int width, const BilateralParams& params, const uint8_t* wanted,
+                       std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out) {
+  BilateralRow<true>(y, width, params, wanted, guide, in, out);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -59,12 +74,21 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace fathom::flat {
 
-HWY_EXPORT(BilateralRow);
+HWY_EXPORT(BilateralMean);
+HWY_EXPORT(BilateralVariance);
 
 void bilateral(int width, int height, const BilateralParams& params, const Buffer<uint8_t>& wanted,
                std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out) {
   parallelFor(0, height, [&](int y) {
-    HWY_DYNAMIC_DISPATCH(BilateralRow)(y, width, params, wanted.data() + size_t(y) * size_t(width), guide, in, out);
+    HWY_DYNAMIC_DISPATCH(BilateralMean)(y, width, params, wanted.data() + size_t(y) * size_t(width), guide, in, out);
+  });
+}
+
+void bilateralVariance(int width, int height, const BilateralParams& params, const Buffer<uint8_t>& wanted,
+                       std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out) {
+  parallelFor(0, height, [&](int y) {
+    HWY_DYNAMIC_DISPATCH(BilateralVariance)
+    (y, width, params, wanted.data() + size_t(y) * size_t(width), guide, in, out);
   });
 }
 

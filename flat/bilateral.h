@@ -21,4 +21,8 @@ struct BilateralParams {
 void bilateral(int width, int height, const BilateralParams& params, const Buffer<uint8_t>& wanted,
                std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out);
 
+// What variances of independent values come to in those means: sum w^2 v / (sum w)^2 of the planes `in`.
+void bilateralVariance(int width, int height, const BilateralParams& params, const Buffer<uint8_t>& wanted,
+                       std::span<const Padded> guide, std::span<const Padded> in, std::span<Padded> out);
+
 }  // namespace fathom::flat

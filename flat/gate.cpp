@@ -1,0 +1,77 @@
+#include "flat/gate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "flat/finite.h"
+#include "flat/gate_kernel.h"
+#include "flat/parallel.h"
+
+namespace fathom::flat {
+
+namespace {
+
+constexpr int kRadius = 3;
+constexpr float kReach = 5;
+constexpr float kFloor = 4e-4f;  // of the squared mean colour: 1e-4 where that is 0.5
+
+Buffer<GateSample> samplesOf(const Image& noisy, const Noise& noise, const Image& denoised) {
+  Buffer<GateSample> samples(noisy.dataWindow.area());
+  std::array<const float*, 3> y, f;
+  for (size_t c = 0; c < 3; ++c) {
+    y[c] = noisy.get(kRgbNames[c]).values.data();
+    f[c] = denoised.get(kRgbNames[c]).values.data();
+  }
+  for (size_t i = 0; i < samples.size(); ++i) {
+    GateSample& sample = samples[i] = {};
+    bool says = noise.pixel[i] != PixelNoise::Unknown;
+    for (size_t c = 0; c < 3; ++c) says = says && isFinite(f[c][i]);
+    if (!says) continue;
+    sample.samples = noise.samples[i];
+    for (size_t c = 0; c < 3; ++c) {
+      sample.filtered[c] = f[c][i];
+      sample.residual[c] = y[c][i] - f[c][i];
+      sample.variance[c] = noise.variance[c][i] * noise.samples[i];
+    }
+  }
+  return samples;
+}
+
+}  // namespace
+
+Buffer<float> gate(const Image& noisy, const Noise& noise, const Image& denoised, const GateParams& params) {
+  const int width = noisy.dataWindow.width(), height = noisy.dataWindow.height();
+  const Buffer<GateSample> samples = samplesOf(noisy, noise, denoised);
+  Buffer<float> result(samples.size(), 0.0f);
+  const float floor = kFloor * noise.level * noise.level;
+  std::array<float, 2 * kRadius + 1> reach;
+  for (int i = -kRadius; i <= kRadius; ++i) reach[size_t(i + kRadius)] = std::exp(-float(i * i) / kReach);
+  parallelFor(0, height, [&](int y) {
+    GateNeighbours neighbours;
+    for (int x = 0; x < width; ++x) {
+      const size_t i = size_t(y) * size_t(width) + size_t(x);
+      if (!(samples[i].samples > 0)) continue;
+      neighbours.count = 0;
+      for (int yq = std::max(0, y - kRadius); yq <= std::min(height - 1, y + kRadius); ++yq)
+        for (int xq = std::max(0, x - kRadius); xq <= std::min(width - 1, x + kRadius); ++xq)
+          neighbours.add(samples[size_t(yq) * size_t(width) + size_t(xq)],
+                         reach[size_t(yq - y + kRadius)] * reach[size_t(xq - x + kRadius)]);
+      result[i] = takenBack(samples[i], neighbours, params.threshold, floor);
+    }
+  });
+  return result;
+}
+
+Image gated(const Image& noisy, const Noise& noise, const Image& denoised, const GateParams& params) {
+  const Buffer<float> k = gate(noisy, noise, denoised, params);
+  Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
+  for (const char* name : kRgbNames) {
+    const Buffer<float>&y = noisy.get(name).values, &f = denoised.get(name).values;
+    Buffer<float>& values = result.add(name).values;
+    for (size_t i = 0; i < values.size(); ++i) values[i] = k[i] > 0 ? f[i] + k[i] * (y[i] - f[i]) : f[i];
+  }
+  return result;
+}
+
+}  // namespace fathom::flat
