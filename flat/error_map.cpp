@@ -1,6 +1,7 @@
 #include "flat/error_map.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "flat/bilateral.h"
@@ -102,9 +103,11 @@ ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Imag
         const size_t i = size_t(y) * width + x;
         const float variance = out[kVariance].row(y)[x];
         map.variance[c][i] = variance;
-        map.covariance[c][i] = out[kCovariance].row(y)[x];
         map.error[c][i] =
             shrunk(out[kSure].row(y)[x], out[kSpread].row(y)[x], variance, noises[c].row(y)[x], prior, params);
+        // No covariance is beyond what both variances allow.
+        const float most = std::sqrt(std::max(variance, 0.0f)) * std::sqrt(map.error[c][i]);
+        map.covariance[c][i] = std::clamp(out[kCovariance].row(y)[x], 0.0f, most);
       }
     });
   }

@@ -1,15 +1,19 @@
 #include "flat/noise.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string>
 
 #include "flat/error.h"
 #include "flat/finite.h"
+#include "flat/parallel.h"
 
 namespace fathom::flat {
 
 namespace {
+
+constexpr int kDarkRadius = 2;
 
 // One channel of a half: its own plane, or its components'.
 struct HalfChannel {
@@ -60,6 +64,20 @@ float meanOf(const std::array<const Plane*, 3>& colour) {
   return mean > 1e-20 && mean < double(kLargest) ? float(mean) : 0.5f;
 }
 
+// Black pixels beside others that are not are not taken for converged.
+void doubtLoneBlack(const Box& window, const Buffer<uint8_t>& dark, Noise& noise) {
+  const int width = window.width(), height = window.height();
+  parallelFor(0, height, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      const size_t i = size_t(y) * size_t(width) + size_t(x);
+      if (!dark[i] || noise.pixel[i] != PixelNoise::Converged) continue;
+      for (int yq = std::max(0, y - kDarkRadius); yq <= std::min(height - 1, y + kDarkRadius); ++yq)
+        for (int xq = std::max(0, x - kDarkRadius); xq <= std::min(width - 1, x + kDarkRadius); ++xq)
+          if (!dark[size_t(yq) * size_t(width) + size_t(xq)]) noise.pixel[i] = PixelNoise::Known;
+    }
+  });
+}
+
 }  // namespace
 
 Noise noiseOf(const Image& image) {
@@ -76,23 +94,25 @@ Noise noiseOf(const Image& image) {
   if (!variances) fromHalves(image, noise);
   const Plane* samples = image.find("samples");
   const int spp = sppOf(image);
+  Buffer<uint8_t> dark(pixels);  // black and without variance
   for (size_t i = 0; i < pixels; ++i) {
-    const float count = samples ? samples->values[i] : float(spp);
-    const bool told = samples || spp > 0;
-    bool finite = true, still = true;
+    const float count = samples ? samples->values[i] : spp > 0 ? float(spp) : 2;
+    bool finite = true, still = true, black = true;
     for (size_t c = 0; c < 3; ++c) {
       const float v = noise.variance[c][i];
       finite = finite && isFinite(v) && v >= 0 && isFinite(colour[c]->values[i]);
       still = still && v == 0;
+      black = black && colour[c]->values[i] == 0;
     }
-    noise.pixel[i] = !finite              ? PixelNoise::Unknown
-                     : !still             ? PixelNoise::Known
-                     : !told || count > 1 ? PixelNoise::Converged
-                                          : PixelNoise::Unknown;
-    if (isFinite(count) && count > 1) noise.samples[i] = count;
+    dark[i] = still && black;
+    noise.pixel[i] = !finite || (still && !(count > 1)) ? PixelNoise::Unknown
+                     : still                            ? PixelNoise::Converged
+                                                        : PixelNoise::Known;
+    if (isFinite(count) && count > 1 && (samples || spp > 0)) noise.samples[i] = count;
     if (noise.pixel[i] != PixelNoise::Known)
       for (Buffer<float>& plane : noise.variance) plane[i] = 0;
   }
+  doubtLoneBlack(image.dataWindow, dark, noise);
   return noise;
 }
 

@@ -42,7 +42,8 @@ Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const E
           values[i] = finite ? y[i] : 0;
           errors[i] = map.error[c][i];
         } else {
-          const float share = std::min(shareOf(map.error[c][i], map.variance[c][i], map.covariance[c][i]), 1 - k[i]);
+          const float variance = std::max(map.variance[c][i], noise.variance[c][i]);
+          const float share = std::min(shareOf(map.error[c][i], variance, map.covariance[c][i]), 1 - k[i]);
           values[i] = share < 1 ? x[i] + share * (y[i] - x[i]) : y[i];
           errors[i] = errorOf(share, map.error[c][i], map.variance[c][i], map.covariance[c][i]);
         }

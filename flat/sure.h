@@ -19,9 +19,9 @@
 namespace fathom::flat {
 
 struct SureParams {
-  int probes = 2;      // runs of the denoiser beside the first; the paper takes 1 or 4
-  float size = 0.01f;  // the step in standard deviations of the noise: small beside what the denoiser's weights
-                       // notice, large beside the rounding of floats (0.3 to 1: estimates 10 to 40 % too small)
+  int probes = 2;     // runs of the denoiser beside the first; the paper takes 1 or 4
+  float size = 0.1f;  // the step in standard deviations of the noise: small beside what the denoiser's weights
+                      // notice, large beside the rounding of floats (0.3 to 1: estimates 10 to 40 % too small)
   uint64_t seed = 1;
 };
 
