@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "deep/bin_neighbours.h"
 #include "deep/still.h"
 #include "flat/parallel.h"
 
@@ -91,8 +92,21 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
   return bins;
 }
 
+Buffer<float> gatedColours(const DenoiseData& data, const Buffer<GateBin>& bins, const Buffer<flat::GateVerdict>& gates,
+                           const Buffer<uint8_t>& still) {
+  Buffer<float> colours(data.bins() * 3);
+  const Buffer<uint8_t> unread = allWithin(still, data.width, data.height, kGateRadius);
+  forActiveBins(data, unread, [&](int) {
+    return [&](int, size_t b) {
+      for (size_t c = 0; c < 3; ++c) colours[3 * b + c] = bins[b].filtered[c] + gates[b].k * bins[b].residual[c];
+    };
+  });
+  return colours;
+}
+
 void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_t>& still,
-                  std::span<const Buffer<float>> filtered, const Buffer<float>& gate) {
+                  std::span<const Buffer<float>> filtered, const Buffer<flat::GateVerdict>& gates,
+                  const Buffer<float>& colours) {
   const std::span<const float> alpha = image.get("A");
   const size_t width = size_t(data.width);
   for (size_t c = 0; c < 3; ++c) {
@@ -110,12 +124,20 @@ void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_
             continue;
           }
           if (still[pixel]) continue;
-          float sum = 0;
+          const float a = std::min(alpha[b], 1.0f), k = gates[b].k;
+          float sum = 0, light = 0;
           for (size_t i = 0; i < part.size(); ++i) {
-            const float f = filtered[i][3 * b + c] * std::min(alpha[b], 1.0f);
+            const float f = filtered[i][3 * b + c] * a;
             float& value = part[i][b];
-            value = gate[b] > 0 && isFinite(value) ? f + gate[b] * (value - f) : f;
+            value = k > 0 && isFinite(value) ? f + k * (value - f) : f;
             sum += value;
+            light += std::fabs(value);
+          }
+          if (!colours.empty()) {
+            const float change = colours[3 * b + c] * a - sum;
+            for (std::span<float>& values : part)
+              values[b] += change * (light > 0 ? std::fabs(values[b]) / light : 1 / float(part.size()));
+            sum += change;
           }
           whole[b] = sum;
         }

@@ -23,9 +23,16 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
                         const Buffer<uint8_t>& still, std::span<const std::array<Buffer<float>, 3>> ofPixels,
                         std::span<Buffer<float>> filtered);
 
-// Writes f + gate * (y - f), premultiplied, by component and whole. Still pixels stay as they are, and bins without a
-// weight, which nothing could fill: what is not finite there becomes 0.
+// The gated colours of the bins, 3 per bin, not premultiplied.
+Buffer<float> gatedColours(const DenoiseData& data, const Buffer<GateBin>& bins, const Buffer<flat::GateVerdict>& gates,
+                           const Buffer<uint8_t>& still);
+
+// Writes f + k (y - f), premultiplied, by component and whole. `colours`, where there are any: the whole of each bin (3
+// values, not premultiplied) as it shall be; the components get of what that differs by as much as they have of the
+// light. Still pixels stay as they are, and bins without a weight, which nothing could fill: what is not finite there
+// becomes 0.
 void writeColours(DeepImage& image, const DenoiseData& data, const Buffer<uint8_t>& still,
-                  std::span<const Buffer<float>> filtered, const Buffer<float>& gate);
+                  std::span<const Buffer<float>> filtered, const Buffer<flat::GateVerdict>& gates,
+                  const Buffer<float>& colours);
 
 }  // namespace fathom::deep

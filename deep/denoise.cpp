@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cmath>
 
+#include "deep/bin_mix.h"
 #include "deep/compose.h"
+#include "deep/consistency.h"
 #include "deep/denoise_data.h"
 #include "deep/feature_prefilter.h"
 #include "deep/filter_bank.h"
@@ -79,7 +81,8 @@ void tell(const FilterCounts& counts, double seconds, DenoiseStats& stats) {
 
 }  // namespace
 
-DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress, DenoiseStats* statsOut) {
+DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress, DenoiseStats* statsOut,
+                  const BaseGuide* guide) {
   DenoiseStats unwanted;
   DenoiseStats& stats = statsOut ? *statsOut : unwanted;
   Clock clock(stats);
@@ -110,12 +113,20 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
       filterColours(data, std::move(guides), activity, passes, plan.level, filterProgress, counts);
   tell(counts, clock.lap("filter"), stats);
 
-  const Buffer<GateBin> bins = compose(image, data, plan.inputs, activity.still, ofPixels, filtered);
+  Buffer<GateBin> bins = compose(image, data, plan.inputs, activity.still, ofPixels, filtered);
   clock.lap("compose");
-  const Buffer<float> k =
-      plan.params.gate ? gate(data, bins, activity.still, plan.level) : Buffer<float>(data.bins(), 0.0f);
+  if (guide && !guide->bins.empty()) mixBins(data, fromBinImages(image, guide->bins), activity.still, plan.level, bins);
+  clock.lap("mix");
+  const Buffer<flat::GateVerdict> gates =
+      plan.params.gate ? gate(data, bins, activity.still, plan.level) : Buffer<flat::GateVerdict>(data.bins(), {});
   clock.lap("gate");
-  writeColours(image, data, activity.still, filtered, k);
+  Buffer<float> colours;
+  if (guide) {
+    colours = gatedColours(data, bins, gates, activity.still);
+    makeConsistent(image, data, *guide, gates, activity.still, plan.level, {}, colours);
+  }
+  clock.lap("consistency");
+  writeColours(image, data, activity.still, filtered, gates, colours);
   dropStatistics(image, plan.params, true);
   clock.lap("compose");
   progress.at(1);
@@ -147,7 +158,9 @@ int denoiseHalo(const DenoisePlan& plan) {
   int rows = 3;
   for (const JointFilterParams& pass : filterPasses(plan))
     rows = kBlendRadius + kErrorRadius + pass.radius + std::max(prefilter, pass.patchRadius + 2 + rows);
-  return rows + kGateRadius + 1;
+  // A guide's mix of bins comes before the gate, its mix of pixels after it.
+  const int guided = plan.guided ? kGateRadius + kConsistencyRadius : 0;
+  return rows + kGateRadius + guided + 1;
 }
 
 }  // namespace fathom::deep

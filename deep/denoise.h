@@ -33,6 +33,8 @@ struct DenoiseInputs {
   int spp = 0;           // fathom:spp; 0: unknown
 };
 
+struct BaseGuide;
+
 DenoiseInputs findDenoiseInputs(std::span<const std::string> channels, const Attributes& attributes);
 
 // One line per thing that is missing and how it is estimated instead, for an artist; empty when all is there.
@@ -51,7 +53,8 @@ struct DenoiseParams {
 struct DenoisePlan {
   DenoiseInputs inputs;
   DenoiseParams params;
-  float level = 0.5f;  // the mean colour of the first frame: absolute constants scale with it
+  float level = 0.5f;   // the mean colour of the first frame: absolute constants scale with it
+  bool guided = false;  // every image comes with a guide
 };
 
 // The mean of the flattened R, G and B over the pixels with alpha, from finite values; 0.5 where there is none.
@@ -67,9 +70,9 @@ struct DenoiseStats {
 };
 
 // Takes an image of tidy bins (sorted, see `isTidy`) that follows DATA.md; returns it with R G B and the components
-// filtered. Alphas, depths, ids and channels it does not know pass unchanged. Throws Error (a channel missing) and
-// Cancelled.
+// filtered. Alphas, depths, ids and channels it does not know pass unchanged. `guide`: what a flat denoiser says of the
+// same rows (deep/base_guide), where the plan has it. Throws Error (a channel missing) and Cancelled.
 DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress = {},
-                  DenoiseStats* stats = nullptr);
+                  DenoiseStats* stats = nullptr, const BaseGuide* guide = nullptr);
 
 }  // namespace fathom::deep

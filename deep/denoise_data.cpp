@@ -14,7 +14,6 @@ namespace {
 constexpr std::array<const char*, 3> kRgb{"R", "G", "B"};
 constexpr std::array<const char*, 3> kXyz{"X", "Y", "Z"};
 constexpr int kRowsAtOnce = 8;
-constexpr int kAssumedSpp = 64;
 
 // Calls body(bin) for all bins, rows in parallel.
 template <class Body>

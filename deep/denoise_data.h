@@ -16,6 +16,9 @@ namespace fathom::deep {
 // Added to the albedo before the diffuse light is divided by it (section 5.2), and multiplied back with it.
 inline constexpr float kAlbedoOffset = 0.03f;
 
+// Camera samples per pixel where nothing tells.
+inline constexpr int kAssumedSpp = 64;
+
 // Bins with less effective alpha (emission, or behind something opaque) have no say and keep their colours: nothing of
 // them is seen, and what little is seen of their neighbours must not be taken for theirs.
 inline constexpr float kLeastShare = 1e-6f;

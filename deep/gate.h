@@ -6,15 +6,17 @@
 
 #include "deep/denoise_data.h"
 #include "flat/gate_kernel.h"
+#include "flat/neighbourhood.h"
 
 namespace fathom::deep {
 
-inline constexpr int kGateRadius = 3;
+inline constexpr int kGateRadius = flat::kNeighbourRadius;
 
 using GateBin = flat::GateSample;
 
-// k of each bin, in [0,1]. Pixels with still[pixel] != 0 are passed over (k is 0). `level`: the mean colour of the
+// What to take back of each bin. Pixels with still[pixel] != 0 are passed over (k is 0). `level`: the mean colour of the
 // frame.
-Buffer<float> gate(const DenoiseData& data, const Buffer<GateBin>& bins, const Buffer<uint8_t>& still, float level);
+Buffer<flat::GateVerdict> gate(const DenoiseData& data, const Buffer<GateBin>& bins, const Buffer<uint8_t>& still,
+                               float level);
 
 }  // namespace fathom::deep

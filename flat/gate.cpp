@@ -1,20 +1,15 @@
 #include "flat/gate.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "flat/finite.h"
 #include "flat/gate_kernel.h"
+#include "flat/neighbourhood.h"
 #include "flat/parallel.h"
 
 namespace fathom::flat {
 
 namespace {
-
-constexpr int kRadius = 3;
-constexpr float kReach = 5;
-constexpr float kFloor = 4e-4f;  // of the squared mean colour: 1e-4 where that is 0.5
 
 Buffer<GateSample> samplesOf(const Image& noisy, const Noise& noise, const Image& denoised) {
   Buffer<GateSample> samples(noisy.dataWindow.area());
@@ -44,20 +39,18 @@ Buffer<float> gate(const Image& noisy, const Noise& noise, const Image& denoised
   const int width = noisy.dataWindow.width(), height = noisy.dataWindow.height();
   const Buffer<GateSample> samples = samplesOf(noisy, noise, denoised);
   Buffer<float> result(samples.size(), 0.0f);
-  const float floor = kFloor * noise.level * noise.level;
-  std::array<float, 2 * kRadius + 1> reach;
-  for (int i = -kRadius; i <= kRadius; ++i) reach[size_t(i + kRadius)] = std::exp(-float(i * i) / kReach);
+  const float floor = kAlikeFloor * noise.level * noise.level;
+  const Reach reach;
   parallelFor(0, height, [&](int y) {
     GateNeighbours neighbours;
     for (int x = 0; x < width; ++x) {
       const size_t i = size_t(y) * size_t(width) + size_t(x);
       if (!(samples[i].samples > 0)) continue;
       neighbours.count = 0;
-      for (int yq = std::max(0, y - kRadius); yq <= std::min(height - 1, y + kRadius); ++yq)
-        for (int xq = std::max(0, x - kRadius); xq <= std::min(width - 1, x + kRadius); ++xq)
-          neighbours.add(samples[size_t(yq) * size_t(width) + size_t(xq)],
-                         reach[size_t(yq - y + kRadius)] * reach[size_t(xq - x + kRadius)]);
-      result[i] = takenBack(samples[i], neighbours, params.threshold, floor);
+      forNeighbours(width, height, x, y, [&](int xq, int yq) {
+        neighbours.add(samples[size_t(yq) * size_t(width) + size_t(xq)], reach(xq - x, yq - y));
+      });
+      result[i] = takenBack(samples[i], neighbours, params.threshold, floor).k;
     }
   });
   return result;

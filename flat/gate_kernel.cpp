@@ -7,15 +7,14 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "flat/exp-inl.h"
+#include "flat/alike-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace fathom::flat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-float TakenBack(const GateSample& here, GateNeighbours& n, float threshold, float floor) {
-  constexpr float kSharpness = 4;
+GateVerdict TakenBack(const GateSample& here, GateNeighbours& n, float threshold, float floor) {
   const hn::ScalableTag<float> d;
   const size_t N = hn::Lanes(d);
   auto weight = hn::Zero(d), square = hn::Zero(d);
@@ -23,15 +22,7 @@ float TakenBack(const GateSample& here, GateNeighbours& n, float threshold, floa
   for (size_t i = n.count; i % N != 0; ++i)
     for (auto& plane : n.value) plane[i] = 0;
   for (size_t i = 0; i < n.count; i += N) {
-    auto distance = hn::Zero(d);
-    for (size_t c = 0; c < 3; ++c) {
-      const auto mine = hn::Set(d, here.filtered[c]);
-      const auto there = hn::Load(d, n.value[c] + i);
-      const auto e = hn::Sub(there, mine);
-      const auto scale = hn::MulAdd(there, there, hn::MulAdd(mine, mine, hn::Set(d, floor)));
-      distance = hn::Add(distance, hn::Div(hn::Mul(e, e), scale));
-    }
-    const auto alike = ExpNegative(d, hn::Mul(distance, hn::Set(d, -kSharpness)));
+    const auto alike = Alike(d, here.filtered, n.value, i, floor);
     const auto perSample = hn::Mul(alike, hn::Load(d, n.value[10] + i));
     const auto u = hn::Mul(perSample, hn::Load(d, n.value[3] + i));
     weight = hn::Add(weight, u);
@@ -43,15 +34,19 @@ float TakenBack(const GateSample& here, GateNeighbours& n, float threshold, floa
   }
   const auto sum = [&](auto v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
   const float u = sum(weight), u2 = sum(square);
-  if (!(u > 0)) return 0;
+  GateVerdict verdict;
+  if (!(u > 0)) return verdict;
   float biased = 0, all = 0;
   for (size_t c = 0; c < 3; ++c) {
     const float m = sum(residual[c]) / u, s2 = sum(variance[c]) / u;
     const float bias2 = std::max(0.0f, m * m - threshold * s2 * (u2 / u / u));
+    verdict.noise[c] = s2 / here.samples;
+    verdict.bias2[c] = bias2;
     biased += bias2;
-    all += bias2 + s2 / here.samples;
+    all += bias2 + verdict.noise[c];
   }
-  return all > 0 && biased <= all ? biased / all : 0;
+  if (all > 0 && biased <= all) verdict.k = biased / all;
+  return verdict;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -63,7 +58,7 @@ namespace fathom::flat {
 
 HWY_EXPORT(TakenBack);
 
-float takenBack(const GateSample& here, GateNeighbours& neighbours, float threshold, float floor) {
+GateVerdict takenBack(const GateSample& here, GateNeighbours& neighbours, float threshold, float floor) {
   return HWY_DYNAMIC_DISPATCH(TakenBack)(here, neighbours, threshold, floor);
 }
 

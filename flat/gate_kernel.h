@@ -40,8 +40,14 @@ struct GateNeighbours {
   }
 };
 
-// k of a value, in [0,1]. `threshold`: how many variances of the mean residual are noise; `floor`: squared filtered
+struct GateVerdict {
+  float k = 0;       // in [0,1]
+  float bias2[3]{};  // the squared bias of the filtered value, as far as it is told from noise
+  float noise[3]{};  // the variance of the noisy value, pooled over the neighbours
+};
+
+// `threshold`: how many variances of the mean residual are noise; `floor`: squared filtered
 // values below this are alike. Fills the neighbours up with zeros to a whole vector.
-float takenBack(const GateSample& here, GateNeighbours& neighbours, float threshold, float floor);
+GateVerdict takenBack(const GateSample& here, GateNeighbours& neighbours, float threshold, float floor);
 
 }  // namespace fathom::flat

@@ -44,7 +44,12 @@ struct GateFrame {
     }
   }
 
-  Buffer<float> run(float level = 0.5f) const { return gate(data, bins, still, level); }
+  Buffer<float> run(float level = 0.5f) const {
+    const Buffer<flat::GateVerdict> verdicts = gate(data, bins, still, level);
+    Buffer<float> k(verdicts.size());
+    for (size_t b = 0; b < k.size(); ++b) k[b] = verdicts[b].k;
+    return k;
+  }
 };
 
 void expectLikeTwin(const GateFrame& frame, float level = 0.5f) {

@@ -1,0 +1,50 @@
+// What a denoiser of flat images says of a deep frame: of the flattened frame, and of its bins.
+//
+// Source: Fathom's own. Clean bins need not be found from bins alone: a flat denoiser (a network, say) knows more about
+// pictures, and a deep frame has several in it - the flattened one, and for each k that of the k-th bins (deep/bin_image).
+// What it makes of the latter is a second estimate of every bin, to be mixed with the deep filter's (deep/bin_mix: they
+// err differently); what it makes of the former is what the bins are made to add up to (deep/consistency).
+#pragma once
+
+#include <vector>
+
+#include "deep/bin_image.h"
+#include "deep/flat_noisy.h"
+#include "flat/denoiser.h"
+
+namespace fathom::deep {
+
+inline constexpr int kMostBinImages = 4;
+
+struct GuideDenoisers {
+  flat::Denoiser flattened;
+  flat::Denoiser bins;  // none: bins are not guided
+};
+
+// Made row by row, so that a frame need not be in memory as a deep image.
+struct GuideInput {
+  flat::Image noisy;
+  std::vector<flat::Image> bins;  // none, or kMostBinImages
+  std::vector<double> shares;     // of bins' effective alpha, by image
+};
+
+// `withBins`: bins are guided, too. The image follows DATA.md, as `denoise` takes it.
+GuideInput guideInput(const DeepImage& image, const DenoiseInputs& inputs, bool withBins);
+
+// Puts the rows of `below` under those of `above`.
+void appendRows(GuideInput& above, const GuideInput& below);
+
+struct BaseGuide {
+  flat::Image noisy;              // R G B, variances and `samples` of the flattened frame
+  flat::Image flattened;          // its denoised R G B, gated (flat/gate)
+  std::vector<flat::Image> bins;  // R G B of the k-th bins
+};
+
+// Runs the denoisers. Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws
+// Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
+BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, const Progress& progress = {});
+
+// The rows [y0, y1) of a guide.
+BaseGuide guideRows(const BaseGuide& guide, int y0, int y1);
+
+}  // namespace fathom::deep
