@@ -29,7 +29,8 @@ std::string describeOidn(const OidnLibrary& library, const OidnParams& params);
 
 // The denoiser. It reads R, G, B, where they are there albedo.{R,G,B}, and beside those N.{X,Y,Z}, which the library takes
 // only together; A tells which pixels are empty. Values that are not finite count as 0, as do negative colours; albedos
-// are clamped to [0,1], normals to [-1,1]. A pixel with A = 0 and no colour stays black. Runs on the processor, on as many
+// are clamped to [0,1], normals to [-1,1]. A pixel with A = 0 and no colour stays black. Images of
+// fewer than 16 pixels a side are too small for the networks: their result is finite, and no better. Runs on the processor, on as many
 // threads as oneTBB may use when it is called; the bits do not depend on how many. Errors of the library become Error.
 Denoiser oidn(std::shared_ptr<const OidnLibrary> library, const OidnParams& params);
 

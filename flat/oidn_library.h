@@ -22,24 +22,24 @@ struct OidnLibrary {
   std::string file;     // where the loader found it
   std::string version;  // "2.5.1"
 
-  OidnDevice* (*newDevice)(int type);
-  void (*setDeviceInt)(OidnDevice*, const char* name, int value);
-  void (*setDeviceBool)(OidnDevice*, const char* name, bool value);
-  int (*getDeviceInt)(OidnDevice*, const char* name);
+  OidnDevice* (*newDevice)(int type) = nullptr;
+  void (*setDeviceInt)(OidnDevice*, const char* name, int value) = nullptr;
+  void (*setDeviceBool)(OidnDevice*, const char* name, bool value) = nullptr;
+  int (*getDeviceInt)(OidnDevice*, const char* name) = nullptr;
   // The first error of this thread since the last call; without a device, of the creation of one.
-  int (*getDeviceError)(OidnDevice*, const char** message);
-  void (*commitDevice)(OidnDevice*);
-  void (*releaseDevice)(OidnDevice*);
-  OidnFilter* (*newFilter)(OidnDevice*, const char* type);
+  int (*getDeviceError)(OidnDevice*, const char** message) = nullptr;
+  void (*commitDevice)(OidnDevice*) = nullptr;
+  void (*releaseDevice)(OidnDevice*) = nullptr;
+  OidnFilter* (*newFilter)(OidnDevice*, const char* type) = nullptr;
   void (*setSharedFilterImage)(OidnFilter*, const char* name, void* pixels, int format, size_t width, size_t height,
-                               size_t byteOffset, size_t pixelByteStride, size_t rowByteStride);
-  void (*setFilterBool)(OidnFilter*, const char* name, bool value);
-  void (*setFilterInt)(OidnFilter*, const char* name, int value);
+                               size_t byteOffset, size_t pixelByteStride, size_t rowByteStride) = nullptr;
+  void (*setFilterBool)(OidnFilter*, const char* name, bool value) = nullptr;
+  void (*setFilterInt)(OidnFilter*, const char* name, int value) = nullptr;
   // The function returns whether to go on.
-  void (*setFilterProgressMonitorFunction)(OidnFilter*, bool (*monitor)(void* user, double done), void* user);
-  void (*commitFilter)(OidnFilter*);
-  void (*executeFilter)(OidnFilter*);
-  void (*releaseFilter)(OidnFilter*);
+  void (*setFilterProgressMonitorFunction)(OidnFilter*, bool (*monitor)(void* user, double done), void* user) = nullptr;
+  void (*commitFilter)(OidnFilter*) = nullptr;
+  void (*executeFilter)(OidnFilter*) = nullptr;
+  void (*releaseFilter)(OidnFilter*) = nullptr;
 };
 
 // The library at `path`, a file or a folder that has it (or whose "lib" has it); where that is empty, at the environment's
