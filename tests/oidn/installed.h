@@ -16,7 +16,7 @@ inline std::string fakeOidn(const std::string& name) {
   return std::string(FATHOM_FAKE_OIDN "/lib") + name + ".so";
 }
 
-// For tests that need the library. CTest installs it before suites that begin with "WithOidn".
+// For tests that need the library. CTest installs it before suites whose names have "WithOidn" in them.
 class WithOidnInstalled : public testing::Test {
  protected:
   void SetUp() override {
