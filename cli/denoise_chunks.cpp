@@ -38,6 +38,16 @@ std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
        source.path(), memoryFor(most) / 1'000'000 + 1, 2 * halo, memoryFor(budget) / 1'000'000);
 }
 
+// The frame as one band; its rows take at most `budget` bytes.
+std::vector<Band> wholeFrame(FrameSource& source, size_t budget) {
+  const Box& window = source.part().dataWindow;
+  const size_t bytes = source.decodedBytes(window.y0, window.y1);
+  if (bytes > budget)
+    fail("{}: expected at least {} MB of memory, for a whole frame, which --base needs; found a limit of {} MB",
+         source.path(), memoryFor(bytes) / 1'000'000 + 1, memoryFor(budget) / 1'000'000);
+  return {{window.y0, window.y1}};
+}
+
 }  // namespace
 
 std::string describeError(const DenoiseFrame& frame) {
@@ -89,7 +99,8 @@ bool ChunkReader::open() {
   if (isDone(frame.outputs, madeBy)) return false;
 
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
-  bands_ = cutBands(*source_, halo_, decodedLimit(job_.memory));
+  const size_t budget = decodedLimit(job_.memory);
+  bands_ = job_.plan.base ? wholeFrame(*source_, budget) : cutBands(*source_, halo_, budget);
   origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
                                                       source_->part().dataWindow, source_->flatAttributes(), madeBy});
   return true;

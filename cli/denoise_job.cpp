@@ -124,6 +124,24 @@ DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequenc
   return job;
 }
 
+// What denoises flat frames in the place of our own filter.
+void setBase(SequencePlan& plan, const DenoiseRequest& request) {
+  const std::string& name = request.base.name;
+  if (plan.deep)
+    usage("--base", fmt::format("expected a flat file for {}, found the deep {}; --flat-guide {} makes it the guide of "
+                                "bins",
+                                name, plan.first, name));
+  if (request.components) usage("--components", fmt::format("expected --base {}, found {}", kOwnBase, name));
+  plan.base = makeBase(request.base, plan.denoise, decodedLimit(request.memory));
+  const deep::DenoiseInputs& inputs = plan.denoise.inputs;
+  const auto note = [&](const std::string& line) { plan.notes.insert(fmt::format("{}: {}", plan.first, line)); };
+  for (const std::string& line : deep::describeMissing(inputs))
+    plan.notes.erase(fmt::format("{}: {}", plan.first, line));
+  if (!inputs.albedo) note("no albedo.*: the colours have no guides");
+  if (inputs.albedo && !inputs.normal) note("no N.*: the albedo guides alone");
+  if (inputs.components) note(fmt::format("diffuse.* and specular.* are left out: {} denoises their sum", name));
+}
+
 // From the first frame of the sequence on disk, whether it is among the job's or not.
 SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, const SourceOptions& source,
                       const std::string& wanted) {
@@ -135,6 +153,7 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
   if (request.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
+  if (request.base.name != kOwnBase) setBase(plan, request);
   return plan;
 }
 
@@ -163,7 +182,7 @@ AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, i
   std::set<std::string> notes;
   deep::DeepImage image =
       plan.firstImage && plan.first == inputs.main ? std::move(*plan.firstImage) : source.read(notes);
-  image = deep::denoise(std::move(image), plan.denoise, progress);
+  image = denoiseAsPlanned(std::move(image), plan, progress);
   if (plan.deep) return image;
   return toFlatFrame(std::move(image), source.flatAttributes());
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/base_denoiser.h"
 #include "cli/denoise_sequence.h"
 #include "cli/load_image.h"
 #include "cli/sequence.h"
@@ -18,6 +19,7 @@ struct DenoiseRequest {
   std::vector<std::string> halves;  // none or two
   std::string map, part;
   deep::DenoiseParams params;
+  BaseOptions base;
   bool components = false;
   bool overwrite = false;
   size_t memory = size_t(8) << 30;

@@ -7,6 +7,7 @@
 #include <exception>
 
 #include "deep/alpha.h"
+#include "deep/apply_flat.h"
 #include "deep/channels.h"
 #include "flat/error.h"
 
@@ -45,11 +46,11 @@ void findInputs(SequencePlan& plan, FrameSource& source) {
     plan.notes.insert(fmt::format("{}: {}", source.path(), line));
 }
 
-// Only what is wanted by the denoiser and for the output is read.
-void wantInputs(const deep::DenoisePlan& plan, FrameSource& source) {
-  source.want([plan](const std::string& name) {
+// Only what is wanted by the denoiser and for the output is read. Another base takes no statistics.
+void wantInputs(const deep::DenoisePlan& plan, bool otherBase, FrameSource& source) {
+  source.want([plan, otherBase](const std::string& name) {
     const bool statistic = deep::describesSamples(deep::roleOf(name, deep::PixelType::Float));
-    return !statistic || plan.params.keepStatistics || deep::denoiseReads(plan.inputs, name);
+    return !statistic || plan.params.keepStatistics || (!otherBase && deep::denoiseReads(plan.inputs, name));
   });
 }
 
@@ -61,7 +62,7 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   FrameSource source(inputs, options);
   plan.deep = source.deep();
   findInputs(plan, source);
-  wantInputs(plan.denoise, source);
+  wantInputs(plan.denoise, false, source);
   const Box window = source.part().dataWindow;
   if (wanted && source.hasStatistics() && source.decodedBytes(window.y0, window.y1) <= decodedLimit(options.memory)) {
     plan.firstImage = source.read(plan.notes);
@@ -116,19 +117,19 @@ FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, c
     source.clusterFirst();
     return source;
   }
-  wantInputs(plan.denoise, source);
+  wantInputs(plan.denoise, plan.base.has_value(), source);
   return source;
 }
 
+deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
+                                 deep::DenoiseStats* stats) {
+  if (!plan.base) return deep::denoise(std::move(image), plan.denoise, progress, stats);
+  return deep::applyFlat(std::move(image), plan.base->denoise, plan.denoise.params.keepStatistics, progress, stats);
+}
+
 std::string describePlan(const SequencePlan& plan) {
-  const deep::DenoiseInputs& in = plan.denoise.inputs;
-  const deep::DenoiseParams& params = plan.denoise.params;
-  std::string text = fmt::format("quality {} gate {} keep {} level {:a} cluster {} spp {} inputs", int(params.quality),
-                                 params.gate, params.keepStatistics, plan.denoise.level, plan.cameraSamples, in.spp);
-  for (const bool flag : {in.components, in.halves, in.halfCounts, in.albedoHalves, in.variance, in.counts, in.albedo,
-                          in.albedoVariance, in.normal, in.normalVariance, in.depthVariance, in.volumes})
-    text += flag ? " 1" : " 0";
-  return text;
+  return fmt::format("{} cluster {} {}", describeFilter(plan.denoise), plan.cameraSamples,
+                     plan.base ? plan.base->settings : "");
 }
 
 }  // namespace fathom::cli

@@ -78,7 +78,7 @@ class SequenceRun {
         stop_};
     const Stopwatch watch;
     try {
-      chunk.image = deep::denoise(std::move(chunk.image), job_.plan.denoise, progress, &report.stats);
+      chunk.image = denoiseAsPlanned(std::move(chunk.image), job_.plan, progress, &report.stats);
       const Box& around = chunk.image.dataWindow;
       if (around.y0 != chunk.band.y0 || around.y1 != chunk.band.y1)
         chunk.image = deep::rows(chunk.image, chunk.band.y0, chunk.band.y1);
