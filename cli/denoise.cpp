@@ -126,6 +126,10 @@ void addDenoise(CLI::App& app) {
       ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
       ->default_str(command->quality);
   addBaseOptions(*sub, command->request.base);
+  option("--flat-guide", command->request.guide, "auto|nlm|oidn|none|FILE",
+         "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of Open Image "
+         "Denoise, which also helps with the bins, or in a file; auto takes what promises the least error")
+      ->default_str(command->request.guide);
   sub->add_flag("--no-gate", command->noGate, "The published filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")

@@ -76,6 +76,7 @@ std::optional<Chunk> ChunkReader::next() {
       chunk.kept = true;
     } else {
       chunk.origin = origin_;
+      chunk.guide = guide_;
       chunk.band = bands_[band_];
       chunk.image = read(chunk.notes);
       chunk.last = ++band_ == bands_.size();
@@ -101,6 +102,9 @@ bool ChunkReader::open() {
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
   const size_t budget = decodedLimit(job_.memory);
   bands_ = job_.plan.base ? wholeFrame(*source_, budget) : cutBands(*source_, halo_, budget);
+  if (job_.plan.guide && job_.plan.guide->wholeFrame && bands_.size() > 1)
+    guide_ = std::make_shared<deep::BaseGuide>(
+        readGuide(*source_, bands_.front().y1 - bands_.front().y0, *job_.plan.guide, frame.inputs, job_.plan.denoise));
   origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
                                                       source_->part().dataWindow, source_->flatAttributes(), madeBy});
   return true;
@@ -130,6 +134,7 @@ deep::DeepImage ChunkReader::read(std::set<std::string>& notes) {
 
 void ChunkReader::close() {
   source_.reset();
+  guide_.reset();
   bands_.clear();
   band_ = 0;
   ++frame_;

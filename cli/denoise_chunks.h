@@ -20,7 +20,8 @@ struct Chunk {
   size_t frame = 0;
   std::shared_ptr<const FrameOrigin> origin;
   Band band{0, 0};
-  bool last = true;             // of its frame
+  bool last = true;                              // of its frame
+  std::shared_ptr<const deep::BaseGuide> guide;  // of the whole frame, where a band needs it
   deep::DeepImage image;        // the band with the rows around it that decide it; then the band denoised
   bool kept = false;            // nothing to do: the outputs are there
   std::string error;            // one line; empty: none
@@ -51,6 +52,7 @@ class ChunkReader {
   std::optional<FrameSource> source_;
   std::vector<Band> bands_;
   std::shared_ptr<const FrameOrigin> origin_;
+  std::shared_ptr<const deep::BaseGuide> guide_;
 };
 
 // The last stage.

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -41,10 +42,18 @@ FilePattern beside(const FilePattern& output, const std::string& component) {
   return result;
 }
 
+// Whether a choice of guide is a file's name.
+bool isFile(const std::string& guide) {
+  for (const char* word : {"auto", "nlm", "oidn", "none"})
+    if (guide == word) return false;
+  return true;
+}
+
 FrameInputs inputsAt(const DenoiseRequest& request, const FilePattern& input, int frame) {
   const auto at = [&](const std::string& path) { return path.empty() ? path : parsePattern(path).at(frame); };
-  FrameInputs inputs{input.at(frame), at(request.features), {}, at(request.alpha)};
+  FrameInputs inputs{input.at(frame), at(request.features), {}, at(request.alpha), {}};
   for (size_t i = 0; i < request.halves.size(); ++i) inputs.halves[i] = at(request.halves[i]);
+  if (isFile(request.guide)) inputs.guide = at(request.guide);
   return inputs;
 }
 
@@ -127,10 +136,6 @@ DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequenc
 // What denoises flat frames in the place of our own filter.
 void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   const std::string& name = request.base.name;
-  if (plan.deep)
-    usage("--base", fmt::format("expected a flat file for {}, found the deep {}; --flat-guide {} makes it the guide of "
-                                "bins",
-                                name, plan.first, name));
   if (request.components) usage("--components", fmt::format("expected --base {}, found {}", kOwnBase, name));
   plan.base = makeBase(request.base, plan.denoise, decodedLimit(request.memory));
   const deep::DenoiseInputs& inputs = plan.denoise.inputs;
@@ -140,6 +145,18 @@ void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   if (!inputs.albedo) note("no albedo.*: the colours have no guides");
   if (inputs.albedo && !inputs.normal) note("no N.*: the albedo guides alone");
   if (inputs.components) note(fmt::format("diffuse.* and specular.* are left out: {} denoises their sum", name));
+}
+
+// What guides the bins of deep frames; --base says it, too.
+void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOptions& options,
+              const std::vector<FrameInputs>& candidates) {
+  const std::string choice =
+      request.guide == "auto" && request.base.name != kOwnBase ? request.base.name : request.guide;
+  const auto first =
+      std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
+  FrameSource source = openFrame(*first, options, plan);
+  plan.guide = planGuide(choice, request.base, plan.denoise, source, decodedLimit(request.memory), plan.notes);
+  plan.denoise.guided = plan.guide.has_value();
 }
 
 // From the first frame of the sequence on disk, whether it is among the job's or not.
@@ -153,7 +170,10 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
   if (request.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
-  if (request.base.name != kOwnBase) setBase(plan, request);
+  if (plan.deep)
+    setGuide(plan, request, source, candidates);
+  else if (request.base.name != kOwnBase)
+    setBase(plan, request);
   return plan;
 }
 
@@ -182,7 +202,7 @@ AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, i
   std::set<std::string> notes;
   deep::DeepImage image =
       plan.firstImage && plan.first == inputs.main ? std::move(*plan.firstImage) : source.read(notes);
-  image = denoiseAsPlanned(std::move(image), plan, progress);
+  image = denoiseAsPlanned(std::move(image), inputs, plan, nullptr, progress);
   if (plan.deep) return image;
   return toFlatFrame(std::move(image), source.flatAttributes());
 }

@@ -16,6 +16,7 @@ namespace fathom::cli {
 struct DenoiseRequest {
   std::string input, output, flattened;
   std::string features, alpha;
+  std::string guide = "auto";       // or nlm, oidn, none, a file: see planGuide
   std::vector<std::string> halves;  // none or two
   std::string map, part;
   deep::DenoiseParams params;

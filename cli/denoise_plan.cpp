@@ -6,6 +6,7 @@
 #include <cmath>
 #include <exception>
 
+#include "cli/stopwatch.h"
 #include "deep/alpha.h"
 #include "deep/apply_flat.h"
 #include "deep/channels.h"
@@ -19,6 +20,7 @@ namespace {
 constexpr size_t kProgramBytes = 200'000'000;
 // An image as it is read and in the denoiser's scratch (2), the next one, and the last one as it is written.
 constexpr size_t kImagesInMemory = 4;
+constexpr double kGuidePart = 0.4;  // of the progress on a frame that is guided
 
 // Whether every sample is one camera sample: all have the same part of their pixel, of which most have several. So says
 // the channel convention of files of samples; bins of a render differ in how many samples they hold.
@@ -121,15 +123,23 @@ FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, c
   return source;
 }
 
-deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
-                                 deep::DenoiseStats* stats) {
-  if (!plan.base) return deep::denoise(std::move(image), plan.denoise, progress, stats);
-  return deep::applyFlat(std::move(image), plan.base->denoise, plan.denoise.params.keepStatistics, progress, stats);
+deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& inputs, const SequencePlan& plan,
+                                 const deep::BaseGuide* guide, const Progress& progress, deep::DenoiseStats* stats) {
+  if (plan.base)
+    return deep::applyFlat(std::move(image), plan.base->denoise, plan.denoise.params.keepStatistics, progress, stats);
+  if (!plan.guide) return deep::denoise(std::move(image), plan.denoise, progress, stats);
+  const Stopwatch watch;
+  const Progress first{[&](double done) { progress.at(kGuidePart * done); }, progress.stop};
+  const deep::BaseGuide rows = guide ? deep::guideRows(*guide, image.dataWindow.y0, image.dataWindow.y1)
+                                     : guideOf(image, *plan.guide, inputs, plan.denoise, first);
+  if (stats) stats->seconds["guide"] += watch.seconds();
+  const Progress rest{[&](double done) { progress.at(kGuidePart + (1 - kGuidePart) * done); }, progress.stop};
+  return deep::denoise(std::move(image), plan.denoise, rest, stats, &rows);
 }
 
 std::string describePlan(const SequencePlan& plan) {
-  return fmt::format("{} cluster {} {}", describeFilter(plan.denoise), plan.cameraSamples,
-                     plan.base ? plan.base->settings : "");
+  return fmt::format("{} cluster {} {} guide {}", describeFilter(plan.denoise), plan.cameraSamples,
+                     plan.base ? plan.base->settings : "", plan.guide ? plan.guide->settings : "none");
 }
 
 }  // namespace fathom::cli

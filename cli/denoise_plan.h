@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/base_denoiser.h"
+#include "cli/frame_guide.h"
 #include "cli/frame_source.h"
 #include "deep/denoise.h"
 
@@ -24,7 +25,8 @@ struct SequencePlan {
   bool cameraSamples = false;  // they hold one deep sample per camera sample, which are clustered first
   // Denoises the frames, which are flat, instead of `denoise`; none: nothing does. It needs whole frames.
   std::optional<BaseDenoiser> base;
-  std::set<std::string> notes;  // lines for the user
+  std::optional<GuidePlan> guide;  // of deep frames
+  std::set<std::string> notes;     // lines for the user
   // The main file that this was decided from; and where it is wanted and fits the memory, the image as it is denoised.
   std::string first;
   std::optional<deep::DeepImage> firstImage;
@@ -38,8 +40,10 @@ SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const Sour
 // Opens a frame as the plan has it: what is read, and whether it is clustered.
 FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, const SequencePlan& plan);
 
-// An image of a source that openFrame gave, denoised as the plan has it.
-deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
+// An image of a source that openFrame gave, denoised as the plan has it. `guide`: of the whole frame, where the plan has
+// one and the image is only a part of it.
+deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& inputs, const SequencePlan& plan,
+                                 const deep::BaseGuide* guide, const Progress& progress,
                                  deep::DenoiseStats* stats = nullptr);
 
 // All of the plan that decides what comes out, as text to be hashed.

@@ -78,7 +78,8 @@ class SequenceRun {
         stop_};
     const Stopwatch watch;
     try {
-      chunk.image = denoiseAsPlanned(std::move(chunk.image), job_.plan, progress, &report.stats);
+      chunk.image = denoiseAsPlanned(std::move(chunk.image), job_.frames[chunk.frame].inputs, job_.plan,
+                                     chunk.guide.get(), progress, &report.stats);
       const Box& around = chunk.image.dataWindow;
       if (around.y0 != chunk.band.y0 || around.y1 != chunk.band.y1)
         chunk.image = deep::rows(chunk.image, chunk.band.y0, chunk.band.y1);

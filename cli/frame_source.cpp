@@ -249,7 +249,7 @@ deep::DeepImage FrameSource::read(std::set<std::string>& notes) {
 
 std::vector<std::string> FrameInputs::files() const {
   std::vector<std::string> result;
-  for (const std::string& file : {main, features, halves[0], halves[1], alpha})
+  for (const std::string& file : {main, features, halves[0], halves[1], alpha, guide})
     if (!file.empty()) result.push_back(file);
   return result;
 }

@@ -23,6 +23,7 @@ struct FrameInputs {
   std::string features;
   std::array<std::string, 2> halves;
   std::string alpha;
+  std::string guide;  // a flat image that is denoised already; not read by FrameSource
 
   std::vector<std::string> files() const;  // the main one first
 };

@@ -21,18 +21,6 @@ void appendRows(flat::Image& above, const flat::Image& below) {
   above.dataWindow.y1 = below.dataWindow.y1;
 }
 
-flat::Image rowsOf(const flat::Image& image, int y0, int y1) {
-  flat::Image result{image.dataWindow, image.displayWindow, {}, image.attributes};
-  result.dataWindow.y0 = y0;
-  result.dataWindow.y1 = y1;
-  const size_t width = size_t(image.dataWindow.width());
-  for (const flat::Plane& plane : image.planes) {
-    flat::Plane& out = result.planes.emplace_back(flat::Plane{plane.name, Buffer<float>(result.dataWindow.area())});
-    std::copy_n(plane.values.begin() + size_t(y0 - image.dataWindow.y0) * width, out.values.size(), out.values.begin());
-  }
-  return result;
-}
-
 // A run's part of the progress of all.
 Progress part(const Progress& progress, size_t i, size_t runs) {
   return {[&progress, i, runs](double done) { progress.at((double(i) + done) / double(runs)); }, progress.stop};
@@ -56,8 +44,9 @@ void appendRows(GuideInput& above, const GuideInput& below) {
   }
 }
 
-BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, const Progress& progress) {
-  const flat::Noise noise = flat::noiseOf(input.noisy);
+BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, float level, const Progress& progress) {
+  flat::Noise noise = flat::noiseOf(input.noisy);
+  noise.level = level;
   double all = 0;
   for (const double share : input.shares) all += share;
   size_t pictures = denoisers.bins ? input.bins.size() : 0;
@@ -79,8 +68,10 @@ BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, const Pro
 }
 
 BaseGuide guideRows(const BaseGuide& guide, int y0, int y1) {
-  BaseGuide result{rowsOf(guide.noisy, y0, y1), rowsOf(guide.flattened, y0, y1), {}};
-  for (const flat::Image& picture : guide.bins) result.bins.push_back(rowsOf(picture, y0, y1));
+  const Box& window = guide.noisy.dataWindow;
+  const Box box{window.x0, y0, window.x1, y1};
+  BaseGuide result{flat::crop(guide.noisy, box), flat::crop(guide.flattened, box), {}};
+  for (const flat::Image& picture : guide.bins) result.bins.push_back(flat::crop(picture, box));
   return result;
 }
 

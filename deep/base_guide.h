@@ -40,9 +40,9 @@ struct BaseGuide {
   std::vector<flat::Image> bins;  // R G B of the k-th bins
 };
 
-// Runs the denoisers. Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws
+// Runs the denoisers. `level`: the mean colour of the frame. Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws
 // Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
-BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, const Progress& progress = {});
+BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, float level, const Progress& progress = {});
 
 // The rows [y0, y1) of a guide.
 BaseGuide guideRows(const BaseGuide& guide, int y0, int y1);

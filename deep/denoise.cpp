@@ -115,7 +115,10 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
 
   Buffer<GateBin> bins = compose(image, data, plan.inputs, activity.still, ofPixels, filtered);
   clock.lap("compose");
-  if (guide && !guide->bins.empty()) mixBins(data, fromBinImages(image, guide->bins), activity.still, plan.level, bins);
+  if (guide && !guide->bins.empty()) {
+    const Buffer<float> second = fromBinImages(image, guide->bins);
+    mixBins(data, second, activity.still, plan.level, bins);
+  }
   clock.lap("mix");
   const Buffer<flat::GateVerdict> gates =
       plan.params.gate ? gate(data, bins, activity.still, plan.level) : Buffer<flat::GateVerdict>(data.bins(), {});
@@ -158,8 +161,9 @@ int denoiseHalo(const DenoisePlan& plan) {
   int rows = 3;
   for (const JointFilterParams& pass : filterPasses(plan))
     rows = kBlendRadius + kErrorRadius + pass.radius + std::max(prefilter, pass.patchRadius + 2 + rows);
-  // A guide's mix of bins comes before the gate, its mix of pixels after it.
-  const int guided = plan.guided ? kGateRadius + kConsistencyRadius : 0;
+  // A guide's mix of bins comes before the gate, its mix of pixels after it; where the guide is the same filter on flat
+  // pixels, it has a gate of its own, and two rows more tell where its noise is known.
+  const int guided = plan.guided ? kGateRadius + kConsistencyRadius + 2 : 0;
   return rows + kGateRadius + guided + 1;
 }
 

@@ -23,6 +23,15 @@ DenoisePlan planFlat(const flat::Image& image, const DenoiseParams& params) {
   return {findDenoiseInputs(names, bins.attributes), params, meanLevel(bins)};
 }
 
+DenoisePlan planFlattened(const DenoisePlan& plan) {
+  DenoisePlan result = plan;
+  result.inputs.counts = true;
+  result.inputs.halfCounts = false;
+  result.inputs.volumes = false;
+  result.guided = false;
+  return result;
+}
+
 flat::Denoiser flatNlMeans(const DenoisePlan& plan) {
   return [plan](const flat::Image& noisy, const Progress& progress) {
     DeepImage bins = denoise(oneBin(noisy), plan, progress);

@@ -10,6 +10,9 @@ namespace fathom::deep {
 // The plan for a flat image taken by itself: what it offers, and its mean colour.
 DenoisePlan planFlat(const flat::Image& image, const DenoiseParams& params);
 
+// The plan for what flattenNoisy makes of frames with this one.
+DenoisePlan planFlattened(const DenoisePlan& plan);
+
 // The denoiser of such a plan.
 flat::Denoiser flatNlMeans(const DenoisePlan& plan);
 

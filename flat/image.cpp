@@ -30,4 +30,16 @@ Image Image::copy() const {
   return result;
 }
 
+Image crop(const Image& image, const Box& box) {
+  Image result{box, image.displayWindow, {}, image.attributes};
+  const size_t width = size_t(image.dataWindow.width()), cut = size_t(box.width());
+  const size_t first = size_t(box.y0 - image.dataWindow.y0) * width + size_t(box.x0 - image.dataWindow.x0);
+  for (const Plane& plane : image.planes) {
+    Buffer<float>& out = result.planes.emplace_back(Plane{plane.name, Buffer<float>(box.area())}).values;
+    for (size_t y = 0; y < size_t(box.height()); ++y)
+      std::copy_n(plane.values.begin() + first + y * width, cut, out.begin() + y * cut);
+  }
+  return result;
+}
+
 }  // namespace fathom::flat

@@ -38,4 +38,7 @@ struct Image {
   Image copy() const;
 };
 
+// The part of an image that lies in `box`, which lies in its data window; the display window stays.
+Image crop(const Image& image, const Box& box);
+
 }  // namespace fathom::flat

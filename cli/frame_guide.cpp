@@ -1,0 +1,161 @@
+#include "cli/frame_guide.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "deep/flat_nl_means.h"
+#include "flat/error.h"
+#include "flat/io.h"
+#include "flat/oidn.h"
+#include "flat/sure.h"
+
+namespace fathom::cli {
+
+namespace {
+
+constexpr int kSampleSide = 384;  // of the middle of the frame that `auto` looks at, pixels
+constexpr int kRowsOfSample = 64;
+
+// A file that is denoised already, as a denoiser.
+flat::Denoiser fileDenoiser(const std::string& path) {
+  return [path](const flat::Image& noisy, const Progress&) {
+    flat::Image guide = flat::read(path);
+    const Box &found = guide.dataWindow, &expected = noisy.dataWindow;
+    if (found != expected)
+      fail("{}: expected the data window of the deep frame, ({}, {}) to ({}, {}), found ({}, {}) to ({}, {})", path,
+           expected.x0, expected.y0, expected.x1 - 1, expected.y1 - 1, found.x0, found.y0, found.x1 - 1, found.y1 - 1);
+    flat::Image result{found, guide.displayWindow, {}, {}};
+    for (const char* name : flat::kRgbNames) {
+      flat::Plane* plane = guide.find(name);
+      if (!plane) fail("{}, channel {}: expected in a guide, found none", path, name);
+      result.planes.push_back({name, std::move(plane->values)});
+    }
+    return result;
+  };
+}
+
+// A frame's flat input from rows [y0, y1), read in pieces.
+deep::GuideInput readInput(FrameSource& source, int y0, int y1, int rowsAtOnce, const deep::DenoiseInputs& inputs,
+                           bool withBins) {
+  std::set<std::string> told;
+  std::optional<deep::GuideInput> result;
+  for (int y = y0; y < y1; y += rowsAtOnce) {
+    deep::GuideInput piece = deep::guideInput(source.read(y, std::min(y + rowsAtOnce, y1), told), inputs, withBins);
+    if (result)
+      deep::appendRows(*result, piece);
+    else
+      result = std::move(piece);
+  }
+  return std::move(*result);
+}
+
+GuidePlan nlmGuide(const deep::DenoisePlan& plan) {
+  return {{deep::flatNlMeans(deep::planFlattened(plan)), {}}, false, "nlm"};
+}
+
+// With the frame's guides prefiltered or not; the pictures of bins are worth no prefilter (a hundredth less error for
+// three times the time).
+GuidePlan oidnGuide(const std::shared_ptr<const flat::OidnLibrary>& library, bool prefilter, size_t scratch) {
+  flat::OidnParams params{.prefilterGuides = prefilter,
+                          .scratchMegabytes = int(std::clamp<size_t>(scratch / 1'000'000, 1, 1'000'000))};
+  flat::OidnParams bins = params;
+  bins.prefilterGuides = false;
+  return {{flat::oidn(library, params), flat::oidn(library, bins)},
+          true,
+          fmt::format("{} bins {}", flat::describeOidn(*library, params), flat::describeOidn(*library, bins))};
+}
+
+std::shared_ptr<const flat::OidnLibrary> oidnIfThere(const std::string& path) {
+  try {
+    return flat::loadOidn(path);
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+// The expected squared error of a denoiser, relative to what it makes of the picture.
+double expectedError(const flat::Image& noisy, const flat::Denoiser& denoise, float level) {
+  const flat::Noise noise = flat::noiseOf(noisy);
+  const flat::Image denoised = denoise(noisy, {});
+  const flat::ErrorEstimate estimate = flat::estimateError(noisy, noise, denoised, denoise, {.probes = 1});
+  const double dark = 0.04 * double(level) * double(level);  // 0.01 where the mean is 0.5, as in relMSE
+  double sum = 0;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < denoised.planes[c].values.size(); ++i) {
+      const double f = double(denoised.planes[c].values[i]);
+      sum += double(estimate.error[c][i]) / (f * f + dark);
+    }
+  return sum;
+}
+
+flat::Image middleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
+  const Box& window = source.part().dataWindow;
+  const int width = std::min(kSampleSide, window.width()), height = std::min(kSampleSide, window.height());
+  const int x0 = window.x0 + (window.width() - width) / 2, y0 = window.y0 + (window.height() - height) / 2;
+  const deep::GuideInput input = readInput(source, y0, y0 + height, kRowsOfSample, inputs, false);
+  return flat::crop(input.noisy, {x0, y0, x0 + width, y0 + height});
+}
+
+bool saysItsNoise(const deep::DenoiseInputs& inputs) {
+  return inputs.variance || inputs.halves;
+}
+
+// Which way of Open Image Denoise, or our own filter.
+GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, const deep::DenoisePlan& plan,
+                    FrameSource& source, size_t scratch, bool ownToo, std::string& name) {
+  const flat::Image middle = middleOf(source, plan.inputs);
+  GuidePlan best;
+  double least = 0;
+  const auto consider = [&](const char* called, GuidePlan guide) {
+    const double error = expectedError(middle, guide.denoisers.flattened, plan.level);
+    if (!name.empty() && !(error < least)) return;
+    name = called;
+    least = error;
+    best = std::move(guide);
+  };
+  consider("oidn with prefiltered guides", oidnGuide(library, true, scratch));
+  consider("oidn", oidnGuide(library, false, scratch));
+  if (ownToo) consider("nlm", nlmGuide(plan));
+  return best;
+}
+
+}  // namespace
+
+std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
+                                   FrameSource& source, size_t scratch, std::set<std::string>& notes) {
+  if (choice == "none") return {};
+  if (!saysItsNoise(plan.inputs)) {
+    if (choice == "auto") return {};
+    fail("{}: expected variance.* or half0.* and half1.* for --flat-guide, found neither", source.path());
+  }
+  if (choice == "nlm") return nlmGuide(plan);
+  if (choice != "auto" && choice != "oidn") return GuidePlan{{}, true, "file"};
+  if (choice == "auto" && plan.params.quality == deep::Quality::Fast) return {};
+  const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : oidnIfThere(base.oidnLibrary);
+  if (!library) return nlmGuide(plan);
+  std::string name;
+  GuidePlan guide = bestGuide(library, plan, source, scratch, choice == "auto", name);
+  notes.insert(fmt::format("{}: bins are guided by {}, which promises the least error", source.path(), name));
+  return guide;
+}
+
+deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, const FrameInputs& inputs,
+                        const deep::DenoisePlan& plan, const Progress& progress) {
+  if (guide.denoisers.flattened)
+    return deep::makeGuide(deep::guideInput(image, plan.inputs, bool(guide.denoisers.bins)), guide.denoisers,
+                           plan.level, progress);
+  return deep::makeGuide(deep::guideInput(image, plan.inputs, false), {fileDenoiser(inputs.guide), {}}, plan.level,
+                         progress);
+}
+
+deep::BaseGuide readGuide(FrameSource& source, int rowsAtOnce, const GuidePlan& guide, const FrameInputs& inputs,
+                          const deep::DenoisePlan& plan) {
+  const Box& window = source.part().dataWindow;
+  const bool file = !guide.denoisers.flattened;
+  return deep::makeGuide(
+      readInput(source, window.y0, window.y1, rowsAtOnce, plan.inputs, !file && bool(guide.denoisers.bins)),
+      file ? deep::GuideDenoisers{fileDenoiser(inputs.guide), {}} : guide.denoisers, plan.level, {});
+}
+
+}  // namespace fathom::cli

@@ -1,0 +1,36 @@
+// What guides the bins of deep frames: --flat-guide, decided once per sequence and made for every frame.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/base_denoiser.h"
+#include "cli/frame_source.h"
+#include "deep/base_guide.h"
+
+namespace fathom::cli {
+
+struct GuidePlan {
+  deep::GuideDenoisers denoisers;  // none: FrameInputs::guide is a file that is denoised already
+  bool wholeFrame = true;          // else a band of rows can be guided by what is made of that band
+  std::string settings;            // all that decides what it makes, as text to be hashed
+};
+
+// The plan for a choice: auto, nlm, oidn, none (then there is none) or a file. `auto` is Open Image Denoise where it is
+// found and its expected error (flat/sure, on the middle of the first frame, `source`) is smaller than that of our own
+// flat filter; that one else; none for Quality::Fast and for frames that say nothing of their noise. Adds to `notes` what
+// it chose. `scratch`: bytes that a library may use. Throws Error where the choice cannot be had.
+std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
+                                   FrameSource& source, size_t scratch, std::set<std::string>& notes);
+
+// The guide of an image, which for wholeFrame is a whole frame.
+deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, const FrameInputs& inputs,
+                        const deep::DenoisePlan& plan, const Progress& progress);
+
+// The guide of a whole frame that is read in pieces of so many rows.
+deep::BaseGuide readGuide(FrameSource& source, int rowsAtOnce, const GuidePlan& guide, const FrameInputs& inputs,
+                          const deep::DenoisePlan& plan);
+
+}  // namespace fathom::cli
