@@ -97,7 +97,7 @@ std::string findVersion(const OidnLibrary& library) {
   }
   const int version = library.getDeviceInt(device, "version");
   library.releaseDevice(device);
-  const std::string text = fmt::format("{}.{}.{}", version / 10000, version / 100 % 100, version % 100);
+  std::string text = fmt::format("{}.{}.{}", version / 10000, version / 100 % 100, version % 100);
   if (version < kOldest) fail("{}: {}, found {}", library.file, kExpected, text);
   return text;
 }
