@@ -51,7 +51,7 @@ deep::GuideInput readInput(FrameSource& source, int y0, int y1, int rowsAtOnce, 
 }
 
 GuidePlan nlmGuide(const deep::DenoisePlan& plan) {
-  return {{deep::flatNlMeans(deep::planFlattened(plan)), {}}, false, "nlm"};
+  return {{deep::flatNlMeans(deep::planFlattened(plan)), {}, deep::kOwnGuide}, false, "nlm"};
 }
 
 // With the frame's guides prefiltered or not; the pictures of bins are worth no prefilter (a hundredth less error for
@@ -61,7 +61,7 @@ GuidePlan oidnGuide(const std::shared_ptr<const flat::OidnLibrary>& library, boo
                           .scratchMegabytes = int(std::clamp<size_t>(scratch / 1'000'000, 1, 1'000'000))};
   flat::OidnParams bins = params;
   bins.prefilterGuides = false;
-  return {{flat::oidn(library, params), flat::oidn(library, bins)},
+  return {{flat::oidn(library, params), flat::oidn(library, bins), {}},
           true,
           fmt::format("{} bins {}", flat::describeOidn(*library, params), flat::describeOidn(*library, bins))};
 }
@@ -145,7 +145,7 @@ deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, co
   if (guide.denoisers.flattened)
     return deep::makeGuide(deep::guideInput(image, plan.inputs, bool(guide.denoisers.bins)), guide.denoisers,
                            plan.level, progress);
-  return deep::makeGuide(deep::guideInput(image, plan.inputs, false), {fileDenoiser(inputs.guide), {}}, plan.level,
+  return deep::makeGuide(deep::guideInput(image, plan.inputs, false), {fileDenoiser(inputs.guide), {}, {}}, plan.level,
                          progress);
 }
 
@@ -155,7 +155,7 @@ deep::BaseGuide readGuide(FrameSource& source, int rowsAtOnce, const GuidePlan& 
   const bool file = !guide.denoisers.flattened;
   return deep::makeGuide(
       readInput(source, window.y0, window.y1, rowsAtOnce, plan.inputs, !file && bool(guide.denoisers.bins)),
-      file ? deep::GuideDenoisers{fileDenoiser(inputs.guide), {}} : guide.denoisers, plan.level, {});
+      file ? deep::GuideDenoisers{fileDenoiser(inputs.guide), {}, {}} : guide.denoisers, plan.level, {});
 }
 
 }  // namespace fathom::cli

@@ -52,6 +52,7 @@ BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, float lev
   size_t pictures = denoisers.bins ? input.bins.size() : 0;
   while (pictures > 0 && !(input.shares[pictures - 1] > kWorthARun * all)) --pictures;
   BaseGuide guide;
+  guide.consistency = denoisers.consistency;
   guide.flattened = flat::gated(input.noisy, noise, denoisers.flattened(input.noisy, part(progress, 0, pictures + 1)));
   for (size_t k = 0; k < pictures; ++k) {
     guide.bins.push_back(denoisers.bins(input.bins[k], part(progress, k + 1, pictures + 1)));
@@ -70,7 +71,7 @@ BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, float lev
 BaseGuide guideRows(const BaseGuide& guide, int y0, int y1) {
   const Box& window = guide.noisy.dataWindow;
   const Box box{window.x0, y0, window.x1, y1};
-  BaseGuide result{flat::crop(guide.noisy, box), flat::crop(guide.flattened, box), {}};
+  BaseGuide result{flat::crop(guide.noisy, box), flat::crop(guide.flattened, box), {}, guide.consistency};
   for (const flat::Image& picture : guide.bins) result.bins.push_back(flat::crop(picture, box));
   return result;
 }

@@ -11,14 +11,31 @@
 #include "deep/bin_image.h"
 #include "deep/flat_noisy.h"
 #include "flat/denoiser.h"
+#include "flat/mix_kernel.h"
 
 namespace fathom::deep {
 
 inline constexpr int kMostBinImages = 4;
 
+// How far bins follow a guide: see deep/consistency.
+struct ConsistencyParams {
+  // The expected squared error of a bin is relative c^2 + noise s^2 + bias^2, of what the gate found: s^2 the noise of the
+  // bin before filtering, bias^2 what is left of the filter's bias. The first is for what nothing tells.
+  float relative = 0.005f;
+  float noise = 0.1f;
+  float alphaNoise = 0.25f;
+  float mostDeviations = 3;
+  // The prior share of the bins' own sum in what a pixel should be, and its strength (flat/mix).
+  flat::MixParams mix{.prior = 0.4f, .strength = 20};
+};
+
+// For a guide that errs as much as the bins' sum, and alike: our own filter on flat pixels.
+inline constexpr ConsistencyParams kOwnGuide{.alphaNoise = 1, .mix = {.prior = 0.75f, .strength = 20}};
+
 struct GuideDenoisers {
   flat::Denoiser flattened;
   flat::Denoiser bins;  // none: bins are not guided
+  ConsistencyParams consistency;
 };
 
 // Made row by row, so that a frame need not be in memory as a deep image.
@@ -38,6 +55,7 @@ struct BaseGuide {
   flat::Image noisy;              // R G B, variances and `samples` of the flattened frame
   flat::Image flattened;          // its denoised R G B, gated (flat/gate)
   std::vector<flat::Image> bins;  // R G B of the k-th bins
+  ConsistencyParams consistency;
 };
 
 // Runs the denoisers. `level`: the mean colour of the frame. Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws

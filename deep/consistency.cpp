@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "flat/finite.h"
+#include "flat/mix.h"
 #include "flat/parallel.h"
 
 namespace fathom::deep {
@@ -78,7 +79,8 @@ void moveBins(const DenoiseData& data, const Pixel& pixel, size_t c, float targe
 
 void makeConsistent(const DeepImage& image, const DenoiseData& data, const BaseGuide& guide,
                     const Buffer<flat::GateVerdict>& gates, const Buffer<uint8_t>& still, float level,
-                    const ConsistencyParams& params, Buffer<float>& colours) {
+                    Buffer<float>& colours) {
+  const ConsistencyParams& params = guide.consistency;
   flat::Noise noise = flat::noiseOf(guide.noisy);
   noise.level = level;
   const flat::Image now = flattened(image, data, colours);

@@ -4,8 +4,8 @@
 // and what the pixel should be, F, the change of smallest sum of (change_n)^2 / v_n that makes sum w_n c_n equal F is
 //   c_n += v_n w_n (F - sum w_m c_m) / sum v_m w_m^2.
 // The alphas are noisy, too, and F is not: N camera samples leave a variance a = (sum w c^2 - (sum w c)^2) / N that is no
-// fault of the bins' colours. It goes into the denominator, a quarter of it: with all of it the flattened frame misses
-// its guide by a tenth where bins differ much, with none the bins follow it across depth edges (pixels that a clip
+// fault of the bins' colours. It goes into the denominator, a part of it: with all of it the flattened frame misses
+// a good guide by a tenth where bins differ much, with none the bins follow it across depth edges (pixels that a clip
 // plane cuts had up to 1.7 times their error). No light becomes negative, and no bin moves by more than three of its
 // own deviations.
 #pragma once
@@ -15,28 +15,16 @@
 #include "deep/base_guide.h"
 #include "deep/denoise_data.h"
 #include "deep/gate.h"
-#include "flat/mix.h"
 
 namespace fathom::deep {
 
 inline constexpr int kConsistencyRadius = flat::kNeighbourRadius;  // of the mix of both flat pictures
-
-struct ConsistencyParams {
-  // v = relative c^2 + noise s^2 + bias^2, of what the gate found: s^2 the noise of the bin before filtering, bias^2 what
-  // is left of the filter's bias. The first is for what nothing tells.
-  float relative = 0.005f;
-  float noise = 0.1f;
-  float alphaNoise = 0.25f;
-  float mostDeviations = 3;
-  // The prior share of the bins' own sum in what the pixel should be, and its strength (flat/mix).
-  flat::MixParams mix{.prior = 0.4f, .strength = 20};
-};
 
 // Changes `colours` (3 per bin, not premultiplied) so that the pixels come near the mix of what they are and of
 // `guide.flattened` that the noisy frame favours. `image`, `data` and `guide` have the same rows; `gates` are the bins'
 // verdicts, after which the colours were gated. Pixels with still[pixel] != 0 stay.
 void makeConsistent(const DeepImage& image, const DenoiseData& data, const BaseGuide& guide,
                     const Buffer<flat::GateVerdict>& gates, const Buffer<uint8_t>& still, float level,
-                    const ConsistencyParams& params, Buffer<float>& colours);
+                    Buffer<float>& colours);
 
 }  // namespace fathom::deep

@@ -126,7 +126,7 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   Buffer<float> colours;
   if (guide) {
     colours = gatedColours(data, bins, gates, activity.still);
-    makeConsistent(image, data, *guide, gates, activity.still, plan.level, {}, colours);
+    makeConsistent(image, data, *guide, gates, activity.still, plan.level, colours);
   }
   clock.lap("consistency");
   writeColours(image, data, activity.still, filtered, gates, colours);
