@@ -1,0 +1,172 @@
+// What a flat denoiser's guide does to bins: they come nearer to the truth and add up to the guide, and nothing else
+// changes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "deep/alpha.h"
+#include "deep/base_guide.h"
+#include "deep/flat_nl_means.h"
+#include "deep/flatten.h"
+#include "tests/reference/rendered_frame.h"
+
+namespace fathom::deep {
+namespace {
+
+constexpr std::array kNames{"R", "G", "B"};
+
+DenoisePlan guidedPlan(const DeepImage& image) {
+  std::vector<std::string> names;
+  for (const Channel& channel : image.channels) names.push_back(channel.name);
+  DenoisePlan plan{findDenoiseInputs(names, image.attributes), {}, meanLevel(image)};
+  plan.guided = true;
+  return plan;
+}
+
+// A denoiser that knows the answer, or nearly.
+flat::Denoiser knows(const flat::Image& answer, float wrong = 0) {
+  return [&answer, wrong](const flat::Image& noisy, const Progress&) {
+    flat::Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
+    for (const char* name : kNames) {
+      result.planes.push_back({name, answer.get(name).values.copy()});
+      for (float& v : result.planes.back().values) v *= 1 + wrong;
+    }
+    return result;
+  };
+}
+
+// Squared errors: of the flattened frame, and of bins weighted by their effective alpha.
+struct Errors {
+  double flat = 0, bins = 0;
+};
+
+Errors errorsOf(const DeepImage& image, const DeepImage& truth) {
+  Errors result;
+  const flat::Image a = flatten(image), b = flatten(truth);
+  const Buffer<float> weight = effectiveAlpha(truth);
+  const auto alpha = truth.get("A");
+  for (const char* name : kNames) {
+    for (size_t i = 0; i < truth.pixels(); ++i)
+      result.flat += std::pow(double(a.get(name).values[i] - b.get(name).values[i]), 2);
+    for (size_t i = 0; i < truth.samples(); ++i)
+      if (alpha[i] > 0)
+        result.bins += double(weight[i]) * std::pow(double((image.get(name)[i] - truth.get(name)[i]) / alpha[i]), 2);
+  }
+  return result;
+}
+
+class Guided : public ::testing::Test {
+ protected:
+  const reference::RenderedFrame frame = reference::renderFrame({.width = 64, .height = 48});
+  const DenoisePlan plan = guidedPlan(frame.noisy);
+  const flat::Image truth = flatten(frame.truth);
+
+  DeepImage guided(const GuideDenoisers& denoisers) const {
+    const BaseGuide guide =
+        makeGuide(guideInput(frame.noisy, plan.inputs, bool(denoisers.bins)), denoisers, plan.level);
+    return denoise(frame.noisy.copy(), plan, {}, nullptr, &guide);
+  }
+};
+
+TEST_F(Guided, AGoodGuideMakesBothBetter) {
+  const Errors before = errorsOf(denoise(frame.noisy.copy(), plan), frame.truth);
+  const Errors after = errorsOf(guided({knows(truth), {}, {}}), frame.truth);
+  EXPECT_LT(after.flat, 0.5 * before.flat);
+  EXPECT_LT(after.bins, 0.95 * before.bins);
+}
+
+TEST_F(Guided, PicturesOfBinsMakeBinsBetter) {
+  const auto answers = binImages(frame.truth, {}, kMostBinImages);
+  size_t next = 0;
+  const flat::Denoiser bins = [&](const flat::Image& noisy, const Progress& progress) {
+    return knows(answers[next++])(noisy, progress);
+  };
+  const Errors flatOnly = errorsOf(guided({knows(truth), {}, {}}), frame.truth);
+  const Errors both = errorsOf(guided({knows(truth), bins, {}}), frame.truth);
+  EXPECT_GE(next, 2u);
+  EXPECT_LT(both.bins, 0.7 * flatOnly.bins);
+}
+
+// A third too bright everywhere: the noisy frame tells, and less than a tenth of the guide's error comes through.
+TEST_F(Guided, ABadGuideDoesLittleHarm) {
+  const float wrong = 0.3f;
+  double guideError = 0;
+  for (const char* name : kNames)
+    for (const float v : truth.get(name).values) guideError += std::pow(double(wrong * v), 2);
+  const Errors before = errorsOf(denoise(frame.noisy.copy(), plan), frame.truth);
+  const Errors after = errorsOf(guided({knows(truth, wrong), {}, {}}), frame.truth);
+  EXPECT_LT(after.flat - before.flat, 0.1 * guideError);
+  EXPECT_LT(after.bins - before.bins, 0.1 * guideError);
+}
+
+TEST_F(Guided, NothingElseChangesAndComponentsAddUp) {
+  const DeepImage out = guided({knows(truth), {}, {}});
+  for (const char* name : {"A", "Z"})
+    EXPECT_EQ(0, std::memcmp(out.get(name).data(), frame.noisy.get(name).data(), out.samples() * sizeof(float)));
+  EXPECT_EQ(out.offsets.size(), frame.noisy.offsets.size());
+  for (const std::string name : kNames)
+    for (size_t i = 0; i < out.samples(); ++i) {
+      ASSERT_NEAR(out.get(name)[i], out.get("diffuse." + name)[i] + out.get("specular." + name)[i], 2e-6);
+      ASSERT_GE(out.get(name)[i], -1e-6f);
+    }
+}
+
+TEST_F(Guided, BandsOfRowsGiveTheSameBits) {
+  const flat::Denoiser own = flatNlMeans(planFlattened(plan));
+  const DeepImage whole = guided({own, {}, kOwnGuide});
+  const int halo = denoiseHalo(plan);
+  const Box& box = frame.noisy.dataWindow;
+  for (const auto& [y0, y1] : {std::pair{box.y0, box.y0 + 9}, {box.y0 + 20, box.y0 + 21}, {box.y1 - 5, box.y1}}) {
+    const DeepImage band = rows(frame.noisy, std::max(y0 - halo, box.y0), std::min(y1 + halo, box.y1));
+    const BaseGuide guide = makeGuide(guideInput(band, plan.inputs, false), {own, {}, kOwnGuide}, plan.level);
+    const DeepImage part = rows(denoise(band.copy(), plan, {}, nullptr, &guide), y0, y1);
+    const DeepImage expected = rows(whole, y0, y1);
+    for (const Channel& channel : expected.channels) {
+      if (channel.type == PixelType::Uint) continue;
+      ASSERT_EQ(0, std::memcmp(channel.values.data(), part.get(channel.name).data(), channel.values.size() * 4))
+          << channel.name << " rows " << y0 << " to " << y1;
+    }
+  }
+}
+
+TEST_F(Guided, GuidesOfPiecesAreThatOfTheWhole) {
+  const Box& box = frame.noisy.dataWindow;
+  GuideInput pieces = guideInput(rows(frame.noisy, box.y0, box.y0 + 13), plan.inputs, true);
+  appendRows(pieces, guideInput(rows(frame.noisy, box.y0 + 13, box.y1), plan.inputs, true));
+  const GuideInput whole = guideInput(frame.noisy, plan.inputs, true);
+  ASSERT_EQ(pieces.noisy.dataWindow, whole.noisy.dataWindow);
+  for (const flat::Plane& plane : whole.noisy.planes)
+    EXPECT_EQ(0, std::memcmp(plane.values.data(), pieces.noisy.get(plane.name).values.data(), plane.values.size() * 4));
+  for (size_t k = 0; k < whole.bins.size(); ++k) {
+    EXPECT_NEAR(pieces.shares[k], whole.shares[k], 1e-9 * (1 + whole.shares[k]));
+    for (const flat::Plane& plane : whole.bins[k].planes)
+      EXPECT_EQ(
+          0, std::memcmp(plane.values.data(), pieces.bins[k].get(plane.name).values.data(), plane.values.size() * 4));
+  }
+}
+
+// One bin a pixel: the deep filter is the flat one, and the flat one's guide is what is there already.
+TEST(OneBin, TheDeepFilterIsTheFlatOne) {
+  const DeepImage deep = reference::renderFrame().noisy;
+  const flat::Image flat = flattenNoisy(deep, guidedPlan(deep).inputs);
+  const DenoisePlan flatPlan = planFlat(flat, {});
+  const flat::Image expected = flatNlMeans(flatPlan)(flat, {});
+  DeepImage bins{flat.dataWindow, flat.displayWindow, Buffer<uint64_t>(flat.dataWindow.area() + 1), {}, {}};
+  for (size_t i = 0; i < bins.offsets.size(); ++i) bins.offsets[i] = i;
+  for (const flat::Plane& plane : flat.planes) {
+    Buffer<float>& values = bins.add(plane.name, PixelType::Float).values;
+    std::copy(plane.values.begin(), plane.values.end(), values.begin());
+    if (plane.name == "A") values.fill(1);
+  }
+  DenoisePlan plan = guidedPlan(bins);
+  plan.guided = false;
+  const DeepImage result = denoise(bins.copy(), plan);
+  for (const char* name : kNames)
+    for (size_t i = 0; i < expected.get(name).values.size(); ++i)
+      ASSERT_NEAR(result.get(name)[i], expected.get(name).values[i],
+                  1e-5 * (1 + std::fabs(expected.get(name).values[i])));
+}
+
+}  // namespace
+}  // namespace fathom::deep
