@@ -125,6 +125,9 @@ void addDenoise(CLI::App& app) {
          "fast takes three quarters of the time of balanced, best two and a half times as much")
       ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
       ->default_str(command->quality);
+  sub->add_flag("--error", command->request.errors,
+                "Also write the estimated squared errors of the colours as error.{R,G,B} (flat frames; three times the "
+                "work)");
   sub->add_flag("--no-gate", command->noGate, "The published filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")

@@ -90,6 +90,9 @@ bool ChunkReader::open() {
 
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
   bands_ = cutBands(*source_, halo_, decodedLimit(job_.memory));
+  if (job_.errors && bands_.size() > 1)
+    fail("{}: expected memory for the whole frame with --error, found a limit of {} MB", frame.inputs.main,
+         job_.memory / 1'000'000);
   origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
                                                       source_->part().dataWindow, source_->flatAttributes(), madeBy});
   return true;

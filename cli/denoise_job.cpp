@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
 
@@ -88,6 +89,7 @@ void checkOutputs(const DenoiseFrame& frame) {
 std::string describeSettings(const DenoiseRequest& request, const SourceOptions& source) {
   std::string text = fmt::format("part {} features {} halves {} alpha {}", request.part, !request.features.empty(),
                                  request.halves.size(), !request.alpha.empty());
+  if (request.errors) text += " errors";
   if (source.map)
     for (const ChannelMap::Line& line : source.map->lines) {
       text += fmt::format("\n{} ={}", line.ours, line.unpremultiplied ? " unpremultiplied" : "");
@@ -120,6 +122,7 @@ DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequenc
   job.memory = request.memory;
   job.overlap = overlap;
   job.overwrite = request.overwrite;
+  job.errors = request.errors;
   job.settings = describeSettings(request, job.source);
   return job;
 }
@@ -133,6 +136,7 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
   SequencePlan plan = planSequence(candidates, source, request.params, wanted);
   if (!plan.deep && !request.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
+  if (plan.deep && request.errors) fail("{}: expected a flat file for --error, found a deep one", request.input);
   if (request.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
   return plan;
@@ -163,8 +167,10 @@ AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, i
   std::set<std::string> notes;
   deep::DeepImage image =
       plan.firstImage && plan.first == inputs.main ? std::move(*plan.firstImage) : source.read(notes);
+  const deep::DeepImage noisy = request.errors ? image.copy() : deep::DeepImage();
   image = deep::denoise(std::move(image), plan.denoise, progress);
   if (plan.deep) return image;
+  if (request.errors) deep::addErrors(noisy, plan.denoise, {{}, progress.stop}, image);
   return toFlatFrame(std::move(image), source.flatAttributes());
 }
 

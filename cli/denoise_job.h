@@ -19,6 +19,7 @@ struct DenoiseRequest {
   std::string map, part;
   deep::DenoiseParams params;
   bool components = false;
+  bool errors = false;  // error.{R,G,B} beside the colours; of flat frames
   bool overwrite = false;
   size_t memory = size_t(8) << 30;
 };

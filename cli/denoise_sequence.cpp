@@ -10,6 +10,7 @@
 
 #include "cli/denoise_chunks.h"
 #include "cli/stopwatch.h"
+#include "deep/flat_nl_means.h"
 #include "flat/error.h"
 #include "flat/progress.h"
 
@@ -78,7 +79,9 @@ class SequenceRun {
         stop_};
     const Stopwatch watch;
     try {
+      const deep::DeepImage noisy = job_.errors ? chunk.image.copy() : deep::DeepImage();
       chunk.image = deep::denoise(std::move(chunk.image), job_.plan.denoise, progress, &report.stats);
+      if (job_.errors) deep::addErrors(noisy, job_.plan.denoise, {{}, stop_}, chunk.image);
       const Box& around = chunk.image.dataWindow;
       if (around.y0 != chunk.band.y0 || around.y1 != chunk.band.y1)
         chunk.image = deep::rows(chunk.image, chunk.band.y0, chunk.band.y1);

@@ -25,6 +25,7 @@ struct DenoiseJob {
   std::string settings;    // everything else that decides what comes out, as text to be hashed
   size_t memory = 0;       // bytes; frames that need more go through in bands of rows
   bool overlap = true;     // read and write beside the work
+  bool errors = false;     // write error.{R,G,B}, too
   bool overwrite = false;  // replace outputs that were made otherwise
 };
 

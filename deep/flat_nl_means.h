@@ -13,4 +13,8 @@ DenoisePlan planFlat(const flat::Image& image, const DenoiseParams& params);
 // The denoiser of such a plan.
 flat::Denoiser flatNlMeans(const DenoisePlan& plan);
 
+// Adds error.{R,G,B}, the estimated squared errors of `denoised`, which denoise() made of `noisy` by the plan. Both hold
+// one opaque bin per pixel, as makeOneBin leaves them, and the whole frame.
+void addErrors(const DeepImage& noisy, const DenoisePlan& plan, const Progress& progress, DeepImage& denoised);
+
 }  // namespace fathom::deep
