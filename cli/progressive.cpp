@@ -28,7 +28,7 @@ struct ProgressiveCommand {
 
 constexpr const char* kFooter = R"(
 IN is a flat render with variance.{R,G,B} or half buffers, or several of one frame with ever more samples per pixel; the
-number is that of the pass. Each gets a result: the denoised colours where denoising helps, the render where it does not.
+number is that of the pass. Each gets a result: denoised colours where denoising helps, the render where it does not.
 OUT has IN's other channels, but no components, half buffers, variances and counts.
 
 Errors are estimates of the relMSE against the truth, (a-r)^2/(r^2+0.01), without knowing it.

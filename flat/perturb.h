@@ -10,8 +10,8 @@
 // - diffuse.* and specular.* share the step in proportion to their variances (independent components have this
 //   covariance with their sum), which keeps R = diffuse + specular.
 // - albedo.* moves with the colour, by its own standard deviation times the correlation of both that half0.albedo.*
-//   and half1.albedo.* show: where several surfaces share a pixel, their camera samples decide both, and a denoiser that
-//   divides by the albedo and multiplies it back hands that noise on.
+//   and half1.albedo.* show: where several surfaces share a pixel, their camera samples decide both, and a denoiser
+//   that divides by the albedo and multiplies it back hands that noise on.
 #pragma once
 
 #include <array>
@@ -42,7 +42,8 @@ class Perturber {
   const Noise& noise_;
   // Per channel and pixel, the diffuse component's part of the variance; empty where there are no components.
   std::array<Buffer<float>, 3> diffuse_;
-  // Per channel and pixel, how far the albedo moves with a standard deviation of the colour; empty where no halves tell.
+  // Per channel and pixel, how far the albedo moves with a standard deviation of the colour; empty where no halves
+  // tell.
   std::array<Buffer<float>, 3> albedo_;
 };
 
