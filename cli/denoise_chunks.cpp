@@ -43,8 +43,10 @@ std::vector<Band> wholeFrame(FrameSource& source, size_t budget) {
   const Box& window = source.part().dataWindow;
   const size_t bytes = source.decodedBytes(window.y0, window.y1);
   if (bytes > budget)
-    fail("{}: expected at least {} MB of memory, for a whole frame, which --base needs; found a limit of {} MB",
-         source.path(), memoryFor(bytes) / 1'000'000 + 1, memoryFor(budget) / 1'000'000);
+    fail(
+        "{}: expected at least {} MB of memory, for a whole frame, which --base and --error need; found a limit of {} "
+        "MB",
+        source.path(), memoryFor(bytes) / 1'000'000 + 1, memoryFor(budget) / 1'000'000);
   return {{window.y0, window.y1}};
 }
 
@@ -101,7 +103,7 @@ bool ChunkReader::open() {
 
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
   const size_t budget = decodedLimit(job_.memory);
-  bands_ = job_.plan.base ? wholeFrame(*source_, budget) : cutBands(*source_, halo_, budget);
+  bands_ = job_.plan.base || job_.plan.errors ? wholeFrame(*source_, budget) : cutBands(*source_, halo_, budget);
   if (job_.plan.guide && job_.plan.guide->wholeFrame && bands_.size() > 1)
     guide_ = std::make_shared<deep::BaseGuide>(
         readGuide(*source_, bands_.front().y1 - bands_.front().y0, *job_.plan.guide, frame.inputs, job_.plan.denoise));

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
 
@@ -166,8 +167,10 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
   for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
     candidates.push_back(inputsAt(request, sequence.pattern, frame));
   SequencePlan plan = planSequence(candidates, source, request.params, wanted);
+  plan.errors = request.errors;
   if (!plan.deep && !request.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
+  if (plan.deep && request.errors) fail("{}: expected a flat file for --error, found a deep one", request.input);
   if (request.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
   if (plan.deep)

@@ -10,6 +10,7 @@
 #include "deep/alpha.h"
 #include "deep/apply_flat.h"
 #include "deep/channels.h"
+#include "deep/flat_nl_means.h"
 #include "flat/error.h"
 
 namespace fathom::cli {
@@ -86,6 +87,24 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   return plan;
 }
 
+// A flat frame; with its errors, denoising is half of the progress.
+deep::DeepImage denoiseFlat(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
+                            deep::DenoiseStats* stats) {
+  const deep::DeepImage noisy = plan.errors ? image.copy() : deep::DeepImage();
+  const double part = plan.errors ? 0.5 : 1;
+  const Progress first{[&](double done) { progress.at(part * done); }, progress.stop};
+  image = plan.base
+              ? deep::applyFlat(std::move(image), plan.base->denoise, plan.denoise.params.keepStatistics, first, stats)
+              : deep::denoise(std::move(image), plan.denoise, first, stats);
+  if (!plan.errors) return image;
+  const Stopwatch watch;
+  const Progress second{[&](double done) { progress.at(part + (1 - part) * done); }, progress.stop};
+  deep::addErrors(noisy, plan.denoise.inputs, plan.base ? plan.base->denoise : deep::flatNlMeans(plan.denoise), second,
+                  image);
+  if (stats) stats->seconds["error"] += watch.seconds();
+  return image;
+}
+
 }  // namespace
 
 size_t decodedLimit(size_t memory) {
@@ -119,14 +138,13 @@ FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, c
     source.clusterFirst();
     return source;
   }
-  wantInputs(plan.denoise, plan.base.has_value(), source);
+  wantInputs(plan.denoise, plan.base.has_value() && !plan.errors, source);
   return source;
 }
 
 deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& inputs, const SequencePlan& plan,
                                  const deep::BaseGuide* guide, const Progress& progress, deep::DenoiseStats* stats) {
-  if (plan.base)
-    return deep::applyFlat(std::move(image), plan.base->denoise, plan.denoise.params.keepStatistics, progress, stats);
+  if (!plan.deep) return denoiseFlat(std::move(image), plan, progress, stats);
   if (!plan.guide) return deep::denoise(std::move(image), plan.denoise, progress, stats);
   const Stopwatch watch;
   const Progress first{[&](double done) { progress.at(kGuidePart * done); }, progress.stop};
@@ -138,8 +156,8 @@ deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& input
 }
 
 std::string describePlan(const SequencePlan& plan) {
-  return fmt::format("{} cluster {} {} guide {}", describeFilter(plan.denoise), plan.cameraSamples,
-                     plan.base ? plan.base->settings : "", plan.guide ? plan.guide->settings : "none");
+  return fmt::format("{} cluster {} {} guide {} errors {}", describeFilter(plan.denoise), plan.cameraSamples,
+                     plan.base ? plan.base->settings : "", plan.guide ? plan.guide->settings : "none", plan.errors);
 }
 
 }  // namespace fathom::cli

@@ -10,6 +10,7 @@
 
 #include "cli/denoise_chunks.h"
 #include "cli/stopwatch.h"
+#include "deep/flat_nl_means.h"
 #include "flat/error.h"
 #include "flat/progress.h"
 

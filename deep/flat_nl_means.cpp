@@ -1,8 +1,10 @@
 #include "deep/flat_nl_means.h"
 
+#include <string>
 #include <utility>
 
 #include "deep/one_bin.h"
+#include "flat/error_map.h"
 
 namespace fathom::deep {
 
@@ -12,6 +14,15 @@ DeepImage oneBin(const flat::Image& image) {
   DeepImage bins = fromFlat(image);
   makeOneBin(bins);
   return bins;
+}
+
+// The image as a flat one, with the count that its noise is of.
+flat::Image pixelsOf(const DeepImage& image, const DenoiseInputs& inputs) {
+  DeepImage bins = image.copy();
+  unmakeOneBin(bins);
+  flat::Image pixels = toFlat(bins);
+  if (inputs.spp > 0) pixels.attributes["fathom:spp"] = std::to_string(inputs.spp);
+  return pixels;
 }
 
 }  // namespace
@@ -40,6 +51,15 @@ flat::Denoiser flatNlMeans(const DenoisePlan& plan) {
       result.planes.push_back({name, std::exchange(bins.find(name)->values, Buffer<float>())});
     return result;
   };
+}
+
+void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, const flat::Denoiser& denoiser,
+               const Progress& progress, DeepImage& denoised) {
+  flat::Image errors = flat::errorPlanes(pixelsOf(noisy, inputs), pixelsOf(denoised, inputs), denoiser, {}, progress);
+  for (flat::Plane& plane : errors.planes) {
+    denoised.erase(plane.name);
+    denoised.add(plane.name, PixelType::Float).values = std::move(plane.values);
+  }
 }
 
 }  // namespace fathom::deep

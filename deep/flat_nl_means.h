@@ -16,4 +16,9 @@ DenoisePlan planFlattened(const DenoisePlan& plan);
 // The denoiser of such a plan.
 flat::Denoiser flatNlMeans(const DenoisePlan& plan);
 
+// Adds error.{R,G,B}, the estimated squared errors of `denoised`, which the denoiser made of `noisy`. Both hold one opaque
+// bin per pixel, as makeOneBin leaves them, and the whole frame.
+void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, const flat::Denoiser& denoiser,
+               const Progress& progress, DeepImage& denoised);
+
 }  // namespace fathom::deep

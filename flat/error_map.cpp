@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "flat/bilateral.h"
@@ -112,6 +113,16 @@ ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Imag
     });
   }
   return map;
+}
+
+Image errorPlanes(const Image& noisy, const Image& denoised, const Denoiser& denoiser, const SureParams& params,
+                  const Progress& progress) {
+  const Noise noise = noiseOf(noisy);
+  ErrorMap map = mapErrors(estimateError(noisy, noise, denoised, denoiser, params, progress), noise, denoised);
+  Image planes{noisy.dataWindow, noisy.displayWindow, {}, {}};
+  for (size_t c = 0; c < 3; ++c)
+    planes.planes.push_back({std::string("error.") + kRgbNames[c], std::move(map.error[c])});
+  return planes;
 }
 
 }  // namespace fathom::flat

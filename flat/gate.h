@@ -1,8 +1,8 @@
 // The gate on pixels: takes back what a denoiser did where a residual that neighbours share says that it did damage.
 //
-// The decision is that of flat/gate_kernel.h; the neighbours are the 7x7 pixels around, with reach exp(-|offset|^2 / 5).
-// Four variances of the mean residual count as noise where the gate on bins has two: on the shared renders two made the
-// best results of Open Image Denoise up to 3 % worse, four did no harm and gained as much (docs/notes.md).
+// The decision is that of flat/gate_kernel.h; the neighbours are the 7x7 pixels around, with reach exp(-|offset|^2 /
+// 5). Two and a half variances of the mean residual count as noise where the gate on bins has two: two cost the best
+// results of Open Image Denoise up to 3 %, and both take 2 % off on average (docs/notes.md).
 #pragma once
 
 #include "flat/noise.h"
@@ -10,7 +10,7 @@
 namespace fathom::flat {
 
 struct GateParams {
-  float threshold = 4;  // variances of the mean residual that are noise
+  float threshold = 2.5f;  // variances of the mean residual that are noise
 };
 
 // k of each pixel of the data window, in [0,1]: the gated value is f + k (y - f), with f `denoised` and y `noisy`.

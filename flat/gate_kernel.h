@@ -1,11 +1,12 @@
 // The gate's decision for one filtered value, shared by pixels (flat/gate) and bins (deep/gate).
 //
 // Source: Fathom's own; it is the t-statistic gate of Firmino et al., "Progressive Denoising of Monte Carlo Rendered
-// Images", section 4.2, on the residual. Noise has no direction, damage has. With weights u_d = n_d reach_d exp(-4 sum_c
-// (f_d - f)^2 / (f_d^2 + f^2 + floor)) of the neighbours d, where f is the filtered and y the noisy colour, n the sample
-// count and v the noisy variance of the mean: m = mean_u(y - f), s2 = mean_u(n v) (the variance of one sample), bias2 =
-// max(0, m^2 - threshold s2 sum(u^2 / n) / sum(u)^2), k = sum_c bias2 / sum_c (bias2 + s2 / n). The result is f + k (y -
-// f).
+// Images", section 4.2, on the residual. Noise has no direction, damage has. With weights u_d = n_d reach_d exp(-4
+// sum_c (f_d - f)^2 / (f_d^2 + f^2 + floor)) of the neighbours d, where f is the filtered and y the noisy colour, n the
+// sample count and v the noisy variance of the mean: m = mean_u(y - f), s2 = mean_u(n v) (the variance of one sample),
+// bias2 = max(0, m^2 - threshold s2 sum(u^2 / n) / sum(u)^2), k = sum_c bias2 / sum_c (bias2 + s2 / n). The result is f
+// + k (y
+// - f).
 #pragma once
 
 #include <cstddef>

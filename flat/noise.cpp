@@ -42,15 +42,6 @@ void fromHalves(const Image& image, Noise& noise) {
   }
 }
 
-// 0: the image does not tell.
-int sppOf(const Image& image) {
-  const auto found = image.attributes.find("fathom:spp");
-  int spp = 0;
-  if (found == image.attributes.end()) return 0;
-  const std::string& text = found->second;
-  return std::from_chars(text.data(), text.data() + text.size(), spp).ec == std::errc() && spp > 0 ? spp : 0;
-}
-
 float meanOf(const std::array<const Plane*, 3>& colour) {
   double sum = 0;
   size_t count = 0;
@@ -79,6 +70,14 @@ void doubtLoneBlack(const Box& window, const Buffer<uint8_t>& dark, Noise& noise
 }
 
 }  // namespace
+
+int sppOf(const Image& image) {
+  const auto found = image.attributes.find("fathom:spp");
+  int spp = 0;
+  if (found == image.attributes.end()) return 0;
+  const std::string& text = found->second;
+  return std::from_chars(text.data(), text.data() + text.size(), spp).ec == std::errc() && spp > 0 ? spp : 0;
+}
 
 Noise noiseOf(const Image& image) {
   const size_t pixels = image.dataWindow.area();

@@ -67,54 +67,97 @@ float shareOf(float varianceA, float varianceB, float lightA, float lightB) {
   return a + b > 0 ? a / (a + b) : 0.5f;
 }
 
+// The difference of the halves of a channel, each of its components' sum where it has no plane of its own.
+Buffer<float> halfDifference(const Image& image, const std::string& channel) {
+  Buffer<float> result(image.dataWindow.area(), 0.0f);
+  const bool whole = image.find("half0." + channel) && image.find("half1." + channel);
+  for (const char* group : {"", "diffuse.", "specular."}) {
+    if (whole != (*group == 0)) continue;
+    const Plane *a = image.find("half0." + (group + channel)), *b = image.find("half1." + (group + channel));
+    for (size_t i = 0; a && b && i < result.size(); ++i) result[i] += a->values[i] - b->values[i];
+  }
+  for (float& v : result) v = finiteOrZero(v);
+  return result;
+}
+
+Buffer<float> product(const Buffer<float>& a, const Buffer<float>& b) {
+  Buffer<float> result(a.size());
+  for (size_t i = 0; i < a.size(); ++i) result[i] = a[i] * b[i];
+  return result;
+}
+
 }  // namespace
 
 Perturber::Perturber(const Image& noisy, const Noise& noise) : noisy_(noisy), noise_(noise) {
+  findShares();
+  findAlbedo();
+}
+
+void Perturber::findShares() {
   for (size_t c = 0; c < 3; ++c) {
     const std::string d = std::string("diffuse.") + kRgbNames[c], s = std::string("specular.") + kRgbNames[c];
-    const Plane *diffuse = noisy.find(d), *specular = noisy.find(s);
+    const Plane *diffuse = noisy_.find(d), *specular = noisy_.find(s);
     if (!diffuse || !specular) return;
-    const Buffer<float> a = pooled(noisy.dataWindow, componentVariance(noisy, d)),
-                        b = pooled(noisy.dataWindow, componentVariance(noisy, s));
+    const Buffer<float> a = pooled(noisy_.dataWindow, componentVariance(noisy_, d)),
+                        b = pooled(noisy_.dataWindow, componentVariance(noisy_, s));
     diffuse_[c] = Buffer<float>(a.size());
     for (size_t i = 0; i < a.size(); ++i) diffuse_[c][i] = shareOf(a[i], b[i], diffuse->values[i], specular->values[i]);
   }
 }
 
-float Perturber::shareOfDiffuse(size_t channel, size_t pixel) const {
-  return diffuse_[channel].empty() ? 0.5f : diffuse_[channel][pixel];
+void Perturber::findAlbedo() {
+  for (size_t c = 0; c < 3; ++c) {
+    const std::string albedo = std::string("albedo.") + kRgbNames[c];
+    if (!noisy_.find(albedo) || !noisy_.find("half0." + albedo) || !noisy_.find("half1." + albedo)) return;
+    const Buffer<float> a = halfDifference(noisy_, albedo), x = halfDifference(noisy_, kRgbNames[c]);
+    const Box& window = noisy_.dataWindow;
+    const Buffer<float> both = pooled(window, product(a, x)), ofAlbedo = pooled(window, product(a, a)),
+                        ofColour = pooled(window, product(x, x)), variance = componentVariance(noisy_, albedo);
+    albedo_[c] = Buffer<float>(a.size());
+    for (size_t i = 0; i < a.size(); ++i) {
+      const float most = std::sqrt(ofAlbedo[i]) * std::sqrt(ofColour[i]);
+      const float correlation = most > 0 ? std::clamp(finiteOrZero(both[i] / most), -1.0f, 1.0f) : 0;
+      albedo_[c][i] = correlation * std::sqrt(variance[i]);
+    }
+  }
 }
 
 Image Perturber::moved(uint64_t seed, int probe, float size) const {
   Image image = noisy_.copy();
-  const Box& window = image.dataWindow;
-  const Plane *n0 = noisy_.find("half0.samples"), *n1 = noisy_.find("half1.samples");
-  // The step of the mean, or of a half that has `own` camera samples where the other has `other`.
-  const auto move = [&](const std::string& prefix, float sign, const Plane* own, const Plane* other) {
-    for (size_t c = 0; c < 3; ++c) {
-      Plane* const planes[3] = {image.find(prefix + kRgbNames[c]), image.find(prefix + "diffuse." + kRgbNames[c]),
-                                image.find(prefix + "specular." + kRgbNames[c])};
-      parallelFor(window.y0, window.y1, [&](int y) {
-        for (int x = window.x0; x < window.x1; ++x) {
-          const size_t i = size_t(y - window.y0) * size_t(window.width()) + size_t(x - window.x0);
-          const float deviation = size * std::sqrt(noise_.variance[c][i]);
-          const float mine = own && other ? own->values[i] : 1, theirs = own && other ? other->values[i] : 1;
-          if (!(deviation > 0) || !(mine > 0)) continue;
-          const Signs signs = signsOf(seed, probe, x, y);
-          const float step =
-              deviation * (signs.ofMean + sign * signs.ofHalves * std::sqrt(std::max(theirs, 0.0f) / mine));
-          const float diffuse = shareOfDiffuse(c, i);
-          const float steps[3] = {step, step * diffuse, step * (1 - diffuse)};
-          for (size_t k = 0; k < 3; ++k)
-            if (planes[k]) planes[k]->values[i] += steps[k];
-        }
-      });
-    }
-  };
-  move("", 0, nullptr, nullptr);
-  move("half0.", 1, n0, n1);
-  move("half1.", -1, n1, n0);
+  move("", 0, seed, probe, size, image);
+  move("half0.", 1, seed, probe, size, image);
+  move("half1.", -1, seed, probe, size, image);
   return image;
+}
+
+// Moves the means, or the half whose sign and name are given.
+void Perturber::move(const std::string& half, float sign, uint64_t seed, int probe, float size, Image& image) const {
+  const Box& window = image.dataWindow;
+  const Plane *mine = nullptr, *theirs = nullptr;
+  if (!half.empty()) {
+    mine = noisy_.find(half + "samples");
+    theirs = noisy_.find(half == "half0." ? "half1.samples" : "half0.samples");
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    Plane* const planes[4] = {image.find(half + kRgbNames[c]), image.find(half + "diffuse." + kRgbNames[c]),
+                              image.find(half + "specular." + kRgbNames[c]),
+                              image.find(half + "albedo." + kRgbNames[c])};
+    parallelFor(window.y0, window.y1, [&](int y) {
+      for (int x = window.x0; x < window.x1; ++x) {
+        const size_t i = size_t(y - window.y0) * size_t(window.width()) + size_t(x - window.x0);
+        const float deviation = std::sqrt(noise_.variance[c][i]);
+        const float own = mine && theirs ? mine->values[i] : 1, other = mine && theirs ? theirs->values[i] : 1;
+        if (!(deviation > 0) || !(own > 0)) continue;
+        const Signs signs = signsOf(seed, probe, x, y);
+        const float steps = size * (signs.ofMean + sign * signs.ofHalves * std::sqrt(std::max(other, 0.0f) / own));
+        const float diffuse = diffuse_[c].empty() ? 0.5f : diffuse_[c][i];
+        const float moves[4] = {deviation, deviation * diffuse, deviation * (1 - diffuse),
+                                albedo_[c].empty() ? 0 : albedo_[c][i]};
+        for (size_t k = 0; k < 4; ++k)
+          if (planes[k]) planes[k]->values[i] += steps * moves[k];
+      }
+    });
+  }
 }
 
 }  // namespace fathom::flat

@@ -9,10 +9,14 @@
 //   signs a and b: each has the variance of its own mean, both are uncorrelated, and the mean moves by s a.
 // - diffuse.* and specular.* share the step in proportion to their variances (independent components have this
 //   covariance with their sum), which keeps R = diffuse + specular.
+// - albedo.* moves with the colour, by its own standard deviation times the correlation of both that half0.albedo.*
+//   and half1.albedo.* show: where several surfaces share a pixel, their camera samples decide both, and a denoiser
+//   that divides by the albedo and multiplies it back hands that noise on.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "flat/image.h"
 #include "flat/noise.h"
@@ -30,12 +34,17 @@ class Perturber {
   Image moved(uint64_t seed, int probe, float size) const;
 
  private:
-  float shareOfDiffuse(size_t channel, size_t pixel) const;
+  void findShares();
+  void findAlbedo();
+  void move(const std::string& half, float sign, uint64_t seed, int probe, float size, Image& image) const;
 
   const Image& noisy_;
   const Noise& noise_;
   // Per channel and pixel, the diffuse component's part of the variance; empty where there are no components.
   std::array<Buffer<float>, 3> diffuse_;
+  // Per channel and pixel, how far the albedo moves with a standard deviation of the colour; empty where no halves
+  // tell.
+  std::array<Buffer<float>, 3> albedo_;
 };
 
 }  // namespace fathom::flat

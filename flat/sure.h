@@ -1,13 +1,13 @@
 // How wrong a denoised render is, pixel by pixel, without a reference, for any denoiser taken as a black box.
 //
 // Source: Stein's unbiased risk estimate as Firmino et al., "Progressive Denoising of Monte Carlo Rendered Images",
-// give it (equations 1 and 2), per pixel and channel: SURE = (f(y) - y)^2 - s^2 + 2 s^2 f'(y), where y is the render, s^2
-// the variance of its means and f the denoiser; s^2 f' is the mean of b (f(y + e b) - f(y)) / e over steps b along the
-// noise (flat/perturb). It is unbiased for normal noise whose variance is known, and its own noise is large: that of
-// (y - truth)^2 - s^2. See flat/error_map for maps to look at and to decide by.
+// give it (equations 1 and 2), per pixel and channel: SURE = (f(y) - y)^2 - s^2 + 2 s^2 f'(y), where y is the render,
+// s^2 the variance of its means and f the denoiser; s^2 f' is the mean of b (f(y + e b) - f(y)) / e over steps b along
+// the noise (flat/perturb). It is unbiased for normal noise whose variance is known, and its own noise is large: that
+// of (y - truth)^2 - s^2. See flat/error_map for maps to look at and to decide by.
 //
-// Beyond the paper: the same runs tell how the filter passes noise on, the mean of ((f(y + e b) - f(y)) / e)^2, which is
-// the variance of the filtered value. It is a smooth lower bound of the error.
+// Beyond the paper: the same runs tell how the filter passes noise on, the mean of ((f(y + e b) - f(y)) / e)^2, which
+// is the variance of the filtered value. It is a smooth lower bound of the error.
 #pragma once
 
 #include <array>

@@ -23,15 +23,17 @@ std::vector<Padded> randomPlanes(int count, int width, int height, int pad, unsi
   return planes;
 }
 
-void expectLikeTwin(int width, int height, int guides, int count, const BilateralParams& params) {
+void expectLikeTwin(int width, int height, int guides, int count, const BilateralParams& params,
+                    bool variances = false) {
   const auto guide = randomPlanes(guides, width, height, params.radius, 1);
   const auto in = randomPlanes(count, width, height, params.radius, 2);
   std::vector<Padded> out;
   for (int i = 0; i < count; ++i) out.emplace_back(width, height, 0);
-  bilateral(width, height, params, Buffer<uint8_t>(size_t(width) * size_t(height), 1), guide, in, out);
+  const auto run = variances ? bilateralVariance : bilateral;
+  run(width, height, params, Buffer<uint8_t>(size_t(width) * size_t(height), 1), guide, in, out);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      const std::vector<double> expected = reference::bilateral(x, y, params, guide, in);
+      const std::vector<double> expected = reference::bilateral(x, y, params, guide, in, variances);
       for (size_t i = 0; i < expected.size(); ++i)
         ASSERT_NEAR(out[i].row(y)[x], expected[i], 1e-5 * expected[i]) << x << ", " << y << " of " << width;
     }
@@ -48,6 +50,13 @@ TEST(Bilateral, EqualsItsTwinForWindowsAndPlanes) {
     for (int radius = 1; radius <= 5; ++radius)
       for (int planes = 1; planes <= 3; ++planes)
         expectLikeTwin(19, 12, planes, 4 - planes, {.radius = radius, .sigma = 1.5f, .sharpness = 4, .floor = 0.01f});
+  });
+}
+
+TEST(Bilateral, VariancesEqualTheirTwin) {
+  forSimdTargets([] {
+    for (int width = 1; width <= 40; ++width) expectLikeTwin(width, 3, 3, 2, {.radius = 2}, true);
+    expectLikeTwin(19, 12, 1, 4, {.radius = 5, .sigma = 1.5f, .sharpness = 4, .floor = 0.01f}, true);
   });
 }
 

@@ -9,9 +9,10 @@
 
 namespace fathom::reference {
 
-// The means of the planes `in` at one pixel.
+// The means of the planes `in` at one pixel; squared: what variances come to in means.
 inline std::vector<double> bilateral(int x, int y, const flat::BilateralParams& params,
-                                     std::span<const flat::Padded> guide, std::span<const flat::Padded> in) {
+                                     std::span<const flat::Padded> guide, std::span<const flat::Padded> in,
+                                     bool squared = false) {
   std::vector<double> sum(in.size(), 0.0);
   double weight = 0;
   for (int dy = -params.radius; dy <= params.radius; ++dy)
@@ -24,9 +25,9 @@ inline std::vector<double> bilateral(int x, int y, const flat::BilateralParams& 
       const double sigma2 = double(params.sigma) * double(params.sigma);
       const double w = std::exp(-double(params.sharpness) * distance - (dx * dx + dy * dy) / (2 * sigma2));
       weight += w;
-      for (size_t i = 0; i < in.size(); ++i) sum[i] += w * double(in[i].row(y + dy)[x + dx]);
+      for (size_t i = 0; i < in.size(); ++i) sum[i] += (squared ? w * w : w) * double(in[i].row(y + dy)[x + dx]);
     }
-  for (double& s : sum) s /= weight;
+  for (double& s : sum) s /= squared ? weight * weight : weight;
   return sum;
 }
 

@@ -1,0 +1,207 @@
+// `fathom progressive` and `fathom denoise --error` as a user runs them.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "deep/io.h"
+#include "flat/io.h"
+#include "tests/reference/noisy_flat.h"
+#include "tests/reference/noisy_frame.h"
+#include "tests/reference/run_fathom.h"
+#include "tests/reference/temporary_folder.h"
+
+namespace fathom {
+namespace {
+
+using flat::Image;
+using testing::HasSubstr;
+using testing::Not;
+
+// A folder with passes in.0001.exr and so on of 16, 64, 256 samples per pixel.
+class Progressive : public testing::Test {
+ protected:
+  void writePasses(int count) {
+    for (int i = 1; i <= count; ++i) {
+      const int half = 2 << (2 * i);
+      reference::NoisyFlat frame =
+          reference::makeNoisyFlat(80, 50, unsigned(i), 0.8f / std::sqrt(float(2 * half)), half, half);
+      frame.noisy.add("A", 1);
+      frame.noisy.add("Z", 2);
+      flat::write(folder_ / fmt::format("in.{:04}.exr", i), frame.noisy);
+    }
+  }
+  Ran run(const std::string& arguments) const { return runFathom(arguments, "cd '" + folder_.path() + "';"); }
+  Image read(const std::string& name) const { return flat::read(folder_ / name); }
+  bool exists(const std::string& name) const { return std::filesystem::exists(folder_ / name); }
+
+  // Mean squared error of R against the truth of makeNoisyFlat, which is the same for all passes.
+  double error(const Image& image) const {
+    const Image truth = reference::makeNoisyFlat(80, 50, 1).truth;
+    double sum = 0;
+    for (size_t i = 0; i < 4000; ++i) {
+      const double e = double(image.get("R").values[i]) - double(truth.get("R").values[i]);
+      sum += e * e / 4000;
+    }
+    return sum;
+  }
+
+  TemporaryFolder folder_;
+};
+
+std::set<std::string> namesOf(const Image& image) {
+  std::set<std::string> names;
+  for (const flat::Plane& plane : image.planes) names.insert(plane.name);
+  return names;
+}
+
+TEST_F(Progressive, EveryPassGetsABetterResult) {
+  writePasses(3);
+  const Ran ran = run("progressive in.####.exr -o out.####.exr --error");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("out.0003.exr: 256 spp, estimated relMSE"));
+  double last = 1;
+  for (int i = 1; i <= 3; ++i) {
+    const Image in = read(fmt::format("in.{:04}.exr", i)), out = read(fmt::format("out.{:04}.exr", i));
+    EXPECT_LT(error(out), 0.6 * error(in));
+    EXPECT_LT(error(out), last);
+    last = error(out);
+    double estimate = 0;
+    for (const float v : out.get("error.R").values) estimate += double(v) / 4000;
+    EXPECT_NEAR(estimate, last, 0.4 * last);
+  }
+  EXPECT_EQ(namesOf(read("out.0001.exr")),
+            (std::set<std::string>{"R", "G", "B", "A", "Z", "error.R", "error.G", "error.B"}));
+}
+
+TEST_F(Progressive, ErrorsAreLeftOutUnlessAskedFor) {
+  writePasses(1);
+  ASSERT_EQ(run("progressive in.0001.exr -o out.exr").status, 0);
+  EXPECT_EQ(namesOf(read("out.exr")), (std::set<std::string>{"R", "G", "B", "A", "Z"}));
+}
+
+TEST_F(Progressive, ThreadsDoNotShow) {
+  writePasses(1);
+  ASSERT_EQ(run("progressive in.0001.exr -o a.exr --threads 1").status, 0);
+  ASSERT_EQ(run("progressive in.0001.exr -o b.exr --threads 4").status, 0);
+  EXPECT_EQ(textOf(folder_ / "a.exr"), textOf(folder_ / "b.exr"));
+}
+
+TEST_F(Progressive, SaysWhereToStop) {
+  writePasses(3);
+  const Ran all = run("progressive in.####.exr -o out.####.exr --report all.json");
+  ASSERT_EQ(all.status, 0) << all.err;
+  const auto without = nlohmann::json::parse(textOf(folder_ / "all.json"));
+  EXPECT_FALSE(without.contains("target"));
+  ASSERT_EQ(without["passes"].size(), 3u);
+  EXPECT_EQ(without["passes"][2]["spp"], 256);
+  const double first = without["passes"][0]["relMSE"], second = without["passes"][1]["relMSE"];
+  EXPECT_LT(second, first);
+  EXPECT_GT(without["passes"][0]["renderRelMSE"], first);
+
+  // Outputs that are there are estimated all the same, and stay.
+  const double target = (first + second) / 2;
+  const Ran ran = run(fmt::format("progressive in.####.exr -o out.####.exr --report r.json --target {}", target));
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("in.0002.exr: estimated relMSE"));
+  EXPECT_THAT(ran.out, HasSubstr("stop rendering here"));
+  EXPECT_THAT(ran.out, Not(HasSubstr("in.0003.exr: estimated")));
+  const auto report = nlohmann::json::parse(textOf(folder_ / "r.json"));
+  EXPECT_EQ(report["stopAt"], "in.0002.exr");
+  EXPECT_EQ(report["passes"][0]["reached"], false);
+  EXPECT_EQ(report["passes"][1]["reached"], true);
+  const auto& tiles = report["passes"][1]["tiles"];
+  ASSERT_EQ(tiles.size(), 2u);
+  EXPECT_EQ(tiles[1]["width"], 16);
+  EXPECT_EQ(tiles[1]["x"], 61);
+  EXPECT_EQ(tiles[0]["reached"], tiles[0]["relMSE"] <= target);
+
+  const Ran none = run("progressive in.####.exr -o out.####.exr --target 1e-9");
+  EXPECT_THAT(none.out, HasSubstr("render on"));
+}
+
+TEST_F(Progressive, WhatIsDoneIsLeftAloneAndWhatIsNotOursRefused) {
+  writePasses(2);
+  ASSERT_EQ(run("progressive in.####.exr -o out.####.exr").status, 0);
+  std::filesystem::remove(folder_ / "out.0002.exr");
+  const auto before = std::filesystem::last_write_time(folder_ / "out.0001.exr");
+  const Ran again = run("progressive in.####.exr -o out.####.exr");
+  EXPECT_THAT(again.out, HasSubstr("out.0001.exr: done before"));
+  EXPECT_EQ(std::filesystem::last_write_time(folder_ / "out.0001.exr"), before);
+  EXPECT_TRUE(exists("out.0002.exr"));
+
+  const Ran other = run("progressive in.####.exr -o out.####.exr --probes 1");
+  EXPECT_EQ(other.status, 1);
+  EXPECT_THAT(other.err, HasSubstr("out.0001.exr: expected nothing there"));
+  EXPECT_EQ(run("progressive in.####.exr -o out.####.exr --probes 1 --overwrite").status, 0);
+}
+
+TEST_F(Progressive, FailsByNameAndGoesOn) {
+  writePasses(2);
+  Image silent = read("in.0001.exr");
+  std::erase_if(silent.planes, [](const auto& p) { return p.name.starts_with("var") || p.name.starts_with("half"); });
+  flat::write(folder_ / "in.0001.exr", silent);
+  const Ran ran = run("progressive in.####.exr -o out.####.exr");
+  EXPECT_EQ(ran.status, 1);
+  EXPECT_THAT(ran.err, HasSubstr("in.0001.exr: channel R: expected variance.*"));
+  EXPECT_FALSE(exists("out.0001.exr"));
+  EXPECT_TRUE(exists("out.0002.exr"));
+
+  deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(8, 6, 1));
+  const Ran deep = run("progressive deep.exr -o out.exr");
+  EXPECT_EQ(deep.status, 1);
+  EXPECT_THAT(deep.err, HasSubstr("deep.exr: expected a flat file, found a deep one"));
+}
+
+TEST_F(Progressive, TellsOfPassesThatDoNotGrow) {
+  writePasses(2);
+  std::filesystem::copy_file(folder_ / "in.0001.exr", folder_ / "in.0003.exr");
+  const Ran ran = run("progressive in.####.exr -o out.####.exr");
+  EXPECT_EQ(ran.status, 0);
+  EXPECT_THAT(ran.err,
+              HasSubstr("in.0003.exr: expected more than the 64 samples per pixel of the pass before, found 16"));
+}
+
+TEST_F(Progressive, HalvesServeWhereThereAreNoVariances) {
+  writePasses(1);
+  Image image = read("in.0001.exr");
+  std::erase_if(image.planes, [](const auto& p) { return p.name.starts_with("variance."); });
+  flat::write(folder_ / "halves.exr", image);
+  ASSERT_EQ(run("progressive halves.exr -o out.exr").status, 0);
+  EXPECT_LT(error(read("out.exr")), 0.6 * error(image));
+}
+
+TEST_F(Progressive, UsageErrorsExitWith2) {
+  writePasses(1);
+  for (const char* arguments :
+       {"progressive in.0001.exr", "progressive in.0001.exr -o in.0001.exr", "progressive in.0001.exr -o out.####.exr",
+        "progressive in.0001.exr -o out.png", "progressive in.0001.exr -o out.exr --probes 0",
+        "progressive in.0001.exr -o out.exr --target -1", "progressive in.0001.exr -o out.exr --frames 1-2",
+        "progressive in.0001.exr -o out.exr --base nothing"})
+    EXPECT_EQ(run(arguments).status, 2) << arguments;
+  EXPECT_FALSE(exists("out.exr"));
+}
+
+TEST_F(Progressive, DenoiseWritesErrorsOfFlatFramesBesideTheSameColours) {
+  writePasses(1);
+  ASSERT_EQ(run("denoise in.0001.exr -o plain.exr").status, 0);
+  const Ran ran = run("denoise in.0001.exr -o errors.exr --error");
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  const Image plain = read("plain.exr"), errors = read("errors.exr");
+  for (const flat::Plane& plane : plain.planes)
+    EXPECT_TRUE(std::equal(plane.values.begin(), plane.values.end(), errors.get(plane.name).values.begin()));
+  double estimate = 0;
+  for (const float v : errors.get("error.R").values) estimate += double(v) / 4000;
+  EXPECT_NEAR(estimate, error(errors), 0.4 * error(errors));
+
+  deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(8, 6, 1));
+  const Ran deep = run("denoise deep.exr -o out.exr --error");
+  EXPECT_EQ(deep.status, 1);
+  EXPECT_THAT(deep.err, HasSubstr("expected a flat file for --error, found a deep one"));
+}
+
+}  // namespace
+}  // namespace fathom

@@ -1,0 +1,180 @@
+// The mix of render and denoised: its formulas, and that it is never far from the better of both.
+#include "flat/progressive.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "flat/error.h"
+#include "flat/error_summary.h"
+#include "tests/reference/noisy_flat.h"
+
+namespace fathom::flat {
+namespace {
+
+using reference::boxDenoiser;
+using reference::makeNoisyFlat;
+using reference::NoisyFlat;
+
+double squaredError(const Image& image, const Image& truth) {
+  double total = 0;
+  for (const char* c : kRgbNames)
+    for (size_t i = 0; i < truth.dataWindow.area(); ++i) {
+      const double e = double(image.get(c).values[i]) - double(truth.get(c).values[i]);
+      total += e * e;
+    }
+  return total / double(3 * truth.dataWindow.area());
+}
+
+// Means over 7x7 pixels, made darker: much less noise, and a bias that does not go away.
+Denoiser biased(float damage) {
+  return [damage](const Image& noisy, const Progress&) {
+    Image result = reference::boxMean(reference::boxMean(reference::boxMean(noisy)));
+    for (Plane& plane : result.planes)
+      for (float& v : plane.values) v *= 1 - damage;
+    return result;
+  };
+}
+
+TEST(Progressive, MixesByEquation9) {
+  const size_t pixels = 35;
+  const NoisyFlat frame = makeNoisyFlat(7, 5, 1, 0.1f);
+  const Image denoised = reference::boxMean(frame.noisy);
+  const Noise noise = noiseOf(frame.noisy);
+  ErrorMap map;
+  Buffer<float> k(pixels);
+  for (size_t c = 0; c < 3; ++c)
+    for (auto* planes : {&map.error, &map.variance, &map.covariance}) (*planes)[c] = Buffer<float>(pixels);
+  for (size_t i = 0; i < pixels; ++i) {
+    k[i] = float(i % 4) / 4;
+    for (size_t c = 0; c < 3; ++c) {
+      map.error[c][i] = 1e-3f * float(i);
+      map.variance[c][i] = 4e-3f * float(i % 6);
+      map.covariance[c][i] = 1e-3f * float(i % 3);
+    }
+  }
+  const Image result = mix(frame.noisy, noise, denoised, map, k);
+  for (size_t i = 0; i < pixels; ++i)
+    for (size_t c = 0; c < 3; ++c) {
+      const double e = double(map.error[c][i]), v = double(map.variance[c][i]), f = double(map.covariance[c][i]);
+      const double s = std::max(v, double(noise.variance[c][i])), all = e + s - 2 * f;
+      const double a = std::min(all > 0 ? std::clamp((s - f) / all, 0.0, 1.0) : 1.0, 1 - double(k[i]));
+      const double x = double(frame.noisy.get(kRgbNames[c]).values[i]),
+                   y = double(denoised.get(kRgbNames[c]).values[i]);
+      EXPECT_NEAR(result.get(kRgbNames[c]).values[i], x + a * (y - x), 1e-5) << i;
+      EXPECT_NEAR(result.get(std::string("error.") + kRgbNames[c]).values[i],
+                  std::max(0.0, (1 - a) * (1 - a) * v + a * a * e + 2 * a * (1 - a) * f), 1e-6);
+    }
+}
+
+TEST(Progressive, IsNoWorseThanTheRenderNorTheDenoiser) {
+  for (const float noise : {0.3f, 0.1f, 0.03f, 0.01f, 0.003f})
+    for (const float damage : {0.0f, 0.02f, 0.1f, 0.5f}) {
+      const NoisyFlat frame = makeNoisyFlat(48, 40, 1, noise);
+      const Denoiser denoiser = biased(damage);
+      const Image result = denoiseProgressively(frame.noisy, denoiser);
+      const double mixed = squaredError(result, frame.truth);
+      EXPECT_LT(mixed, 1.1 * squaredError(frame.noisy, frame.truth)) << noise << ", " << damage;
+      EXPECT_LT(mixed, 1.1 * squaredError(denoiser(frame.noisy, {}), frame.truth)) << noise << ", " << damage;
+    }
+}
+
+// The noise falls by 100 each time, the bias stays: so must the error fall.
+TEST(Progressive, ConvergesToTheTruthWithADenoiserThatDoesNot) {
+  double last = 1;
+  for (const float noise : {0.3f, 0.03f, 0.003f, 0.0003f}) {
+    const NoisyFlat frame = makeNoisyFlat(48, 40, 1, noise);
+    const double error = squaredError(denoiseProgressively(frame.noisy, biased(0.1f)), frame.truth);
+    EXPECT_LT(error, last / 4) << noise;
+    last = error;
+  }
+  EXPECT_LT(last, 1.1 * 0.0003 * 0.0003);
+}
+
+TEST(Progressive, ConvergedPixelsAreTheRenderItself) {
+  NoisyFlat frame = makeNoisyFlat(16, 12, 1, 0.1f);
+  for (const char* c : kRgbNames)
+    for (size_t i = 0; i < 96; ++i) frame.noisy.find(std::string("variance.") + c)->values[i] = 0;
+  const Image result = denoiseProgressively(frame.noisy, biased(0.5f));
+  for (const char* c : kRgbNames)
+    for (size_t i = 0; i < 96; ++i) {
+      EXPECT_EQ(result.get(c).values[i], frame.noisy.get(c).values[i]);
+      EXPECT_EQ(result.get(std::string("error.") + c).values[i], 0);
+    }
+}
+
+TEST(Progressive, UnknownPixelsAreTheDenoisedValueAndNothingSpreads) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  NoisyFlat frame = makeNoisyFlat(16, 12, 1, 0.1f);
+  frame.noisy.find("G")->values[40] = nan;
+  // As a filter that steps over what is not finite.
+  const Denoiser denoiser = [](const Image& noisy, const Progress& progress) {
+    Image clean = noisy.copy();
+    for (const char* c : kRgbNames)
+      for (float& v : clean.find(c)->values) v = std::isfinite(v) ? v : 0.5f;
+    return boxDenoiser()(clean, progress);
+  };
+  const Image result = denoiseProgressively(frame.noisy, denoiser);
+  EXPECT_EQ(result.get("G").values[40], denoiser(frame.noisy, {}).get("G").values[40]);
+  for (const Plane& plane : result.planes)
+    for (const float v : plane.values) ASSERT_TRUE(std::isfinite(v)) << plane.name;
+  // A denoiser that breaks everywhere leaves the render.
+  const Denoiser broken = [&](const Image& noisy, const Progress&) {
+    Image none = noisy.copy();
+    for (const char* c : kRgbNames) none.find(c)->values.fill(nan);
+    return none;
+  };
+  const Image kept = denoiseProgressively(frame.noisy, broken);
+  for (size_t i = 0; i < 192; ++i) EXPECT_EQ(kept.get("R").values[i], frame.noisy.get("R").values[i]);
+  EXPECT_EQ(kept.get("G").values[40], 0);
+}
+
+TEST(Progressive, TakesAnySizeAndNumberOfThreads) {
+  for (const auto& [width, height] : {std::pair(1, 1), std::pair(1, 9), std::pair(9, 1), std::pair(33, 21)}) {
+    const NoisyFlat frame = makeNoisyFlat(width, height, 1, 0.1f);
+    const Image many = denoiseProgressively(frame.noisy, boxDenoiser());
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    const Image single = denoiseProgressively(frame.noisy, boxDenoiser());
+    for (const Plane& plane : many.planes)
+      for (size_t i = 0; i < plane.values.size(); ++i) ASSERT_EQ(plane.values[i], single.get(plane.name).values[i]);
+  }
+}
+
+TEST(Progressive, ProgressNeverFallsAndEndsAtOne) {
+  double last = 0;
+  denoiseProgressively(makeNoisyFlat(9, 9, 1).noisy, boxDenoiser(), {},
+                       {[&](double done) {
+                          EXPECT_GE(done, last);
+                          last = done;
+                        },
+                        {}});
+  EXPECT_EQ(last, 1);
+}
+
+TEST(ErrorSummary, IsTheMeanOfRelativeErrorsByFrameAndTile) {
+  Image image{{10, 20, 110, 90}, {0, 0, 200, 100}, {}, {}};
+  for (const char* c : kRgbNames) {
+    image.add(c, 0.3f);
+    image.add(std::string("error.") + c, 0.001f);
+    image.add(std::string("variance.") + c, 0.01f);
+  }
+  for (int y = 84; y < 90; ++y)
+    for (int x = 74; x < 110; ++x)
+      for (const char* c : kRgbNames)
+        image.find(std::string("error.") + c)->values[image.dataWindow.index(x, y)] = 0.1f;
+  image.find("R")->values[0] = std::numeric_limits<float>::quiet_NaN();
+  const ErrorSummary summary = summarizeErrors(image, noiseOf(image));
+  ASSERT_EQ(summary.tiles.size(), 4u);
+  EXPECT_EQ(summary.tiles[3].window.x0, 74);
+  EXPECT_EQ(summary.tiles[3].window.y1, 90);
+  EXPECT_NEAR(summary.tiles[0].relMse, 0.01, 1e-7);
+  EXPECT_NEAR(summary.tiles[3].relMse, 1, 1e-6);
+  const double share = 36.0 * 6 / 7000;
+  EXPECT_NEAR(summary.relMse, (1 - share) * 0.01 + share, 1e-4);
+  EXPECT_NEAR(summary.render, 0.1, 1e-4);
+}
+
+}  // namespace
+}  // namespace fathom::flat
