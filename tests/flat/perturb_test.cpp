@@ -1,6 +1,7 @@
 // Steps along the noise: their moments, and that the parts of a render stay consistent.
 #include "flat/perturb.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,7 +47,9 @@ TEST(Perturb, KeepsMeansOfHalvesAndSumsOfComponents) {
       for (const std::string c : {"R", "G", "B"}) {
         EXPECT_NEAR(step(c, i), (n0 * step("half0." + c, i) + n1 * step("half1." + c, i)) / (n0 + n1), 1e-6);
         for (const std::string half : {"", "half0.", "half1."})
-          EXPECT_NEAR(step(half + c, i), step(half + "diffuse." + c, i) + step(half + "specular." + c, i), 1e-6);
+          EXPECT_NEAR(step(half + c, i),
+                      step(fmt::format("{}diffuse.{}", half, c), i) + step(fmt::format("{}specular.{}", half, c), i),
+                      1e-6);
       }
   }
 }

@@ -106,8 +106,7 @@ TEST(Sure, IsUnbiasedForAFilterThatMixesChannels) {
       0.1f);
 }
 
-// Weights made from one half filter the other, as our NL-Means does it: only steps of the halves that are uncorrelated
-// give the true covariance.
+// Weights made from one half filter the other, as our NL-Means does it: halves must move, and their mean with them.
 TEST(Sure, IsUnbiasedForAFilterOfHalves) {
   expectUnbiased(
       [](const Image& noisy, const Progress&) {

@@ -1,6 +1,9 @@
 // A flat render with Gaussian noise of known variance, its truth, and simple denoisers, for tests.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <string>
@@ -36,13 +39,14 @@ inline NoisyFlat makeNoisyFlat(int width, int height, unsigned seed, float noise
     for (const std::string half : {"", "half0.", "half1."}) {
       Buffer<float> whole(pixels);
       for (size_t i = 0; i < pixels; ++i) {
-        const float x = float(i % size_t(width)), y = float(i / size_t(width));
+        const size_t row = i / size_t(width);
+        const float x = float(i % size_t(width)), y = float(row);
         truth[i] = scale * (0.6f + 0.3f * std::sin(0.2f * x) * std::cos(0.15f * y));
         const float mean = (float(n0) * e0[i] + float(n1) * e1[i]) / n;
         whole[i] = truth[i] + scale * noise * (half.empty() ? mean : half == "half0." ? e0[i] : e1[i]);
       }
       for (const std::string part : {"diffuse.", "specular."}) {
-        Buffer<float>& values = frame.noisy.add(half + part + name).values;
+        Buffer<float>& values = frame.noisy.add(fmt::format("{}{}{}", half, part, name)).values;
         for (size_t i = 0; i < pixels; ++i) values[i] = 0.5f * whole[i];
       }
       frame.noisy.add(half + name).values = std::move(whole);
