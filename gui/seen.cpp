@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "deep/ops/insert.h"
 #include "deep/sample_view.h"
 #include "flat/error.h"
 #include "flat/parallel.h"
@@ -28,9 +29,17 @@ std::vector<std::string> shownChannels(const Layer& layer) {
   return result;
 }
 
+// Those that a layer takes of a picture.
+std::vector<std::string> namesOf(const Layer& layer, const std::string& alpha) {
+  std::vector<std::string> names = layer.channels;
+  if (!alpha.empty()) names.push_back(alpha);
+  return names;
+}
+
 // What the planes of some rows are filled from, and where they begin.
 struct Band {
   Box box;
+  int step;
   size_t first;
 };
 
@@ -39,25 +48,25 @@ void compositeBand(const deep::DeepImage& image, const deep::DepthRange& clip, c
   std::vector<std::string> all = channels;
   if (alpha != "A" && !alpha.empty()) all.push_back(alpha);
   std::erase(all, "A");
-  const flat::Image made = deep::clipView(image, band.box, seen.step, clip, all);
+  const flat::Image made = deep::clipView(image, band.box, band.step, clip, all);
   for (size_t c = 0; c < channels.size(); ++c)
     std::ranges::copy(made.get(channels[c]).values, seen.values[c].data() + band.first);
   if (!alpha.empty()) std::ranges::copy(made.get(alpha).values, seen.alpha.data() + band.first);
 }
 
 void spoilBand(const deep::DeepImage& image, const deep::DepthRange& clip, const Band& band, Seen& seen) {
-  std::ranges::copy(deep::findNonFinite(image, band.box, seen.step, clip, seen.layer.channels),
+  std::ranges::copy(deep::findNonFinite(image, band.box, band.step, clip, seen.layer.channels),
                     seen.spoiled.data() + band.first);
 }
 
 void countBand(const deep::DeepImage& image, const deep::DepthRange& clip, const Band& band, Seen& seen) {
-  std::ranges::transform(deep::countSamples(image, band.box, seen.step, clip), seen.values[0].data() + band.first,
+  std::ranges::transform(deep::countSamples(image, band.box, band.step, clip), seen.values[0].data() + band.first,
                          [](uint32_t count) { return float(count); });
 }
 
 void identifyBand(const deep::DeepImage& image, const deep::DepthRange& clip, const std::string& channel,
                   const Band& band, Seen& seen) {
-  const Buffer<uint64_t> chosen = deep::mostSeen(image, band.box, seen.step, clip);
+  const Buffer<uint64_t> chosen = deep::mostSeen(image, band.box, band.step, clip);
   const Buffer<uint32_t>& ids = image.find(channel)->ids;
   for (size_t i = 0; i < chosen.size(); ++i)
     if (chosen[i] != deep::kNoSample) seen.ids[band.first + i] = ids[chosen[i]];
@@ -66,11 +75,11 @@ void identifyBand(const deep::DeepImage& image, const deep::DepthRange& clip, co
 void takePlane(const flat::Image& image, const std::string& channel, const Band& band, const Seen& seen,
                Buffer<float>& to) {
   const std::span<const float> from = image.get(channel).values;
-  const int rows = (band.box.height() + seen.step - 1) / seen.step;
+  const int rows = (band.box.height() + band.step - 1) / band.step;
   parallelFor(0, rows, [&](int row) {
-    const int y = band.box.y0 + row * seen.step;
+    const int y = band.box.y0 + row * band.step;
     for (int column = 0; column < seen.width; ++column)
-      if (const int x = band.box.x0 + column * seen.step; image.dataWindow.contains(x, y))
+      if (const int x = band.box.x0 + column * band.step; image.dataWindow.contains(x, y))
         to[band.first + size_t(row) * size_t(seen.width) + size_t(column)] = from[image.dataWindow.index(x, y)];
   });
 }
@@ -89,7 +98,7 @@ ptrdiff_t Seen::index(QPoint pixel) const {
 }
 
 Seen see(const Picture& picture, const std::string& layerName, const deep::DepthRange& clip, const Box& box, int step,
-         const Progress& progress) {
+         const Progress& progress, const Overlay* overlay) {
   const Layer* layer = picture.layer(layerName);
   if (!layer) fail("{}: no channel to show", picture.path);
   Seen seen{*layer, box, step, (box.width() + step - 1) / step, (box.height() + step - 1) / step};
@@ -108,16 +117,26 @@ Seen see(const Picture& picture, const std::string& layerName, const deep::Depth
   for (int row = 0; row < seen.height; row += kBandRows) {
     progress.at(double(row) / seen.height);
     const Box rows{box.x0, box.y0 + row * step, box.x1, std::min(box.y1, box.y0 + (row + kBandRows) * step)};
-    const Band band{rows, size_t(row) * size_t(seen.width)};
-    if (!picture.deep())
+    Band band{rows, step, size_t(row) * size_t(seen.width)};
+    if (!picture.deep()) {
       takeBand(*picture.flat(), channels, alpha, band, seen);
-    else if (layer->kind == Kind::Count)
-      countBand(*picture.deep(), clip, band, seen);
+      continue;
+    }
+    const deep::DeepImage* image = picture.deep();
+    deep::DeepImage part;
+    if (overlay && !intersect(rows, overlay->window()).empty()) {
+      part = deep::insertPart(*image, *overlay->volume, overlay->move, rows, step, namesOf(*layer, alpha));
+      image = &part;
+      band.box = part.dataWindow;
+      band.step = 1;
+    }
+    if (layer->kind == Kind::Count)
+      countBand(*image, clip, band, seen);
     else if (layer->kind == Kind::Identifier)
-      identifyBand(*picture.deep(), clip, channels[0], band, seen);
+      identifyBand(*image, clip, channels[0], band, seen);
     else
-      compositeBand(*picture.deep(), clip, channels, alpha, band, seen);
-    if (spoiled) spoilBand(*picture.deep(), clip, band, seen);
+      compositeBand(*image, clip, channels, alpha, band, seen);
+    if (spoiled) spoilBand(*image, clip, band, seen);
   }
   return seen;
 }
