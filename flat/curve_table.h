@@ -1,9 +1,7 @@
 // A function of one number as a table: straight lines between points that lie evenly in each octave.
 #pragma once
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -24,21 +22,17 @@ class CurveTable {
   static std::optional<CurveTable> make(const std::function<void(std::span<float>)>& evaluate, float tolerance);
 
   // In [0,1].
-  float operator()(float x) const {
-    const uint32_t place = std::bit_cast<uint32_t>(std::abs(x) + kBias) - kFirst;
-    const float* from = values_.data() + (std::signbit(x) ? kPoints : 0) + (place >> kRest);
-    const float along = float(int32_t(place & ((1u << kRest) - 1))) * (1.0f / (1u << kRest));
-    return std::min(std::max(0.0f, from[0] + along * (from[1] - from[0])), 1.0f);
-  }
+  float operator()(float x) const;
+
+  // At the points of positive numbers, then at those of negative ones.
+  std::span<const float> values() const { return values_; }
 
  private:
-  // The octaves are those of |x| + kBias, so that the first one begins at 0.
-  static constexpr float kBias = 0x1p-32f;
-  static constexpr uint32_t kFirst = std::bit_cast<uint32_t>(kBias);
-  static constexpr int kRest = 16;                              // bits of a place between two points
-  static constexpr int kPoints = 48 * (1 << (23 - kRest)) + 1;  // of a sign, up to 2^16
-
-  std::vector<float> values_;  // at the points of positive numbers, then at those of negative ones
+  std::vector<float> values_;
 };
+
+// Opaque pixels 0xffRRGGBB: a function for each channel, the value times 255, rounded.
+void lookUpPixels(const std::array<const CurveTable*, 3>& tables, const std::array<const float*, 3>& rgb, size_t pixels,
+                  uint32_t* to);
 
 }  // namespace fathom::flat

@@ -80,6 +80,11 @@ SeenPtr Compositor::seen(const PicturePtr& picture, const RenderRequest& request
       see(*picture, request.state.layer, request.state.clip, request.box, step, progress, request.overlay.get()));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   if (made->pixels() >= kMeasurable) secondsPerPixel_ = took.count() / double(made->pixels());
+  // What only another clip tells from it is of no more use: a plane that is dragged goes on.
+  std::erase_if(kept_, [&](const Kept& kept) {
+    return kept.picture.lock() == picture && kept.seen->layer.name == made->layer.name && kept.seen->step == step &&
+           kept.seen->box == request.box;
+  });
   kept_.push_front({picture, request.state.clip, request.overlay, made});
   size_t bytes = 0;
   std::erase_if(kept_, [&](const Kept& kept) {

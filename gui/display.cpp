@@ -26,7 +26,7 @@ namespace {
 constexpr uint32_t kOpaque = 0xff000000u;
 // Of a table, in the middle of its lines and so half of what it may be off by elsewhere; 1 is white.
 constexpr float kTolerance = 0.2f / 255;
-constexpr size_t kMostKept = 16;  // transforms, of 150 KB each
+constexpr size_t kMostKept = 16;  // transforms, of 200 KB and more each
 
 ocio::ConstConfigRcPtr loadConfig(const std::string& path) {
   try {
@@ -91,35 +91,38 @@ RowTransform exact(const ocio::ConstProcessorRcPtr& processor) {
   };
 }
 
-// The rows by tables; none where channels mix, or where a table would be too far off.
-using Tables = std::array<flat::CurveTable, 3>;
-std::shared_ptr<const Tables> makeTables(const ocio::ConstProcessorRcPtr& processor) {
-  if (processor->hasChannelCrosstalk()) return nullptr;
+// A table for each channel, channels that are treated alike with the same one; none where channels mix, or where a table
+// would be too far off.
+using Tables = std::array<std::shared_ptr<const flat::CurveTable>, 3>;
+std::optional<Tables> makeTables(const ocio::ConstProcessorRcPtr& processor) {
+  if (processor->hasChannelCrosstalk()) return {};
   const ocio::ConstCPUProcessorRcPtr cpu =
       processor->getOptimizedCPUProcessor(ocio::BIT_DEPTH_F32, ocio::BIT_DEPTH_F32, ocio::OPTIMIZATION_DEFAULT);
-  std::array<std::optional<flat::CurveTable>, 3> made;
+  std::vector<float> rgba;  // all of it, from the first channel on
+  Tables tables;
   for (size_t c = 0; c < 3; ++c) {
     const auto evaluate = [&](std::span<float> values) {
-      std::vector<float> rgba(4 * values.size(), 1.0f);
-      for (size_t i = 0; i < values.size(); ++i) std::fill_n(&rgba[4 * i], 3, values[i]);
-      auto image = describe(rgba.data(), int(values.size()), ocio::CHANNEL_ORDERING_RGBA, ocio::BIT_DEPTH_F32);
-      cpu->apply(image);
+      if (rgba.empty()) {
+        rgba.assign(4 * values.size(), 1.0f);
+        for (size_t i = 0; i < values.size(); ++i) std::fill_n(&rgba[4 * i], 3, values[i]);
+        auto image = describe(rgba.data(), int(values.size()), ocio::CHANNEL_ORDERING_RGBA, ocio::BIT_DEPTH_F32);
+        cpu->apply(image);
+      }
       for (size_t i = 0; i < values.size(); ++i) values[i] = rgba[4 * i + c];
     };
-    made[c] = flat::CurveTable::make(evaluate, kTolerance);
-    if (!made[c]) return nullptr;
+    std::optional<flat::CurveTable> made = flat::CurveTable::make(evaluate, kTolerance);
+    if (!made) return {};
+    const bool alike = c > 0 && std::ranges::equal(made->values(), tables[0]->values());
+    tables[c] = alike ? tables[0] : std::make_shared<const flat::CurveTable>(*std::move(made));
   }
-  return std::make_shared<const Tables>(Tables{*std::move(made[0]), *std::move(made[1]), *std::move(made[2])});
+  return tables;
 }
 
 RowTransform tabulated(const ocio::ConstProcessorRcPtr& processor) {
-  const std::shared_ptr<const Tables> tables = makeTables(processor);
+  const std::optional<Tables> tables = makeTables(processor);
   if (!tables) return exact(processor);
-  return [tables](const std::array<const float*, 3>& rgb, int pixels, QRgb* to) {
-    const auto& [red, green, blue] = *tables;
-    const auto step = [](float value) { return uint32_t(int32_t(value * 255 + 0.5f)); };
-    for (size_t x = 0; x < size_t(pixels); ++x)
-      to[x] = kOpaque | step(red(rgb[0][x])) << 16 | step(green(rgb[1][x])) << 8 | step(blue(rgb[2][x]));
+  return [all = *tables](const std::array<const float*, 3>& rgb, int pixels, QRgb* to) {
+    flat::lookUpPixels({all[0].get(), all[1].get(), all[2].get()}, rgb, size_t(pixels), to);
   };
 }
 

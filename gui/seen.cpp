@@ -41,17 +41,32 @@ struct Band {
   Box box;
   int step;
   size_t first;
+
+  size_t pixels(const Seen& seen) const { return size_t((box.height() + step - 1) / step) * size_t(seen.width); }
 };
 
 void compositeBand(const deep::DeepImage& image, const deep::DepthRange& clip, const std::vector<std::string>& channels,
                    const std::string& alpha, const Band& band, Seen& seen) {
-  std::vector<std::string> all = channels;
-  if (alpha != "A" && !alpha.empty()) all.push_back(alpha);
-  std::erase(all, "A");
-  const flat::Image made = deep::clipView(image, band.box, band.step, clip, all);
+  std::vector<std::string> names;
+  std::vector<float*> planes;
+  const auto add = [&](const std::string& name, float* plane) {
+    names.push_back(name);
+    planes.push_back(plane);
+  };
+  Buffer<float> none;
+  float* covered = nullptr;  // where A goes
   for (size_t c = 0; c < channels.size(); ++c)
-    std::ranges::copy(made.get(channels[c]).values, seen.values[c].data() + band.first);
-  if (!alpha.empty()) std::ranges::copy(made.get(alpha).values, seen.alpha.data() + band.first);
+    if (float* plane = seen.values[c].data() + band.first; channels[c] == "A")
+      covered = plane;
+    else
+      add(channels[c], plane);
+  if (!alpha.empty() && alpha != "A") add(alpha, seen.alpha.data() + band.first);
+  float* const kept = alpha == "A" ? seen.alpha.data() + band.first : nullptr;
+  const size_t pixels = band.pixels(seen);
+  if (!covered && !kept) none = Buffer<float>(pixels);
+  planes.push_back(kept ? kept : covered ? covered : none.data());
+  deep::clipViewInto(image, band.box, band.step, clip, names, planes);
+  if (kept && covered) std::copy_n(kept, pixels, covered);
 }
 
 void spoilBand(const deep::DeepImage& image, const deep::DepthRange& clip, const Band& band, Seen& seen) {
@@ -105,12 +120,15 @@ Seen see(const Picture& picture, const std::string& layerName, const deep::Depth
   const std::vector<std::string> channels = shownChannels(*layer);
   const std::string alpha = alphaOf(picture, *layer);
   const size_t planes = layer->kind == Kind::Count ? 1 : channels.size();
+  const auto plane = [&] {  // compositing writes all of it
+    return picture.deep() ? Buffer<float>(seen.pixels()) : Buffer<float>(seen.pixels(), 0.0f);
+  };
   if (layer->kind == Kind::Identifier)
     seen.ids = Buffer<uint32_t>(seen.pixels(), 0);
   else
-    for (size_t c = 0; c < planes; ++c) seen.values.emplace_back(seen.pixels(), 0.0f);
+    for (size_t c = 0; c < planes; ++c) seen.values.push_back(plane());
   const bool composited = layer->kind != Kind::Count && layer->kind != Kind::Identifier;
-  if (!alpha.empty() && composited) seen.alpha = Buffer<float>(seen.pixels(), 0.0f);
+  if (!alpha.empty() && composited) seen.alpha = plane();
 
   const bool spoiled = picture.deep() && layer->nonFinite && layer->kind != Kind::Depth;
   if (spoiled) seen.spoiled = Buffer<uint8_t>(seen.pixels(), 0);

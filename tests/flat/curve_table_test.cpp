@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
+
+#include "tests/reference/simd_targets.h"
 
 namespace fathom::flat {
 namespace {
@@ -55,6 +58,32 @@ TEST(CurveTable, ThereIsNoneOfWhatJumpsOrIsNoNumber) {
   EXPECT_FALSE(tableOf([](double x) { return std::pow(std::abs(x), 0.02); }));
   EXPECT_FALSE(tableOf([](double x) { return std::sqrt(x); }));  // of negative numbers
   EXPECT_FALSE(tableOf([](double x) { return 0.5 + std::sin(1000 * x); }));
+}
+
+// All instruction sets give what one number after the other does, wherever rows begin and end.
+TEST(CurveTable, PixelsAreTheNumbersOfTheirChannels) {
+  const auto red = *tableOf(srgb), green = *tableOf([](double x) { return 1 - x; }),
+             blue = *tableOf([](double x) { return x * x; });
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> octave(-40, 16), sign(-1, 1);
+  std::vector<float> values(300);
+  for (float& value : values)
+    value = std::copysign(std::min(std::exp2(octave(random)), CurveTable::kMost), sign(random));
+  values[3] = 0;
+  values[5] = -CurveTable::kMost;
+  const auto step = [](const CurveTable& table, float x) { return uint32_t(table(x) * 255 + 0.5f); };
+  forSimdTargets([&] {
+    for (size_t first = 0; first < 5; ++first)
+      for (size_t count = 0; count < 40; ++count) {
+        std::vector<uint32_t> pixels(count + 1, 7);
+        const float* r = values.data() + first;
+        lookUpPixels({&red, &green, &blue}, {r, r + 100, r + 200}, count, pixels.data());
+        for (size_t x = 0; x < count; ++x)
+          ASSERT_EQ(pixels[x],
+                    0xff000000u | step(red, r[x]) << 16 | step(green, r[100 + x]) << 8 | step(blue, r[200 + x]));
+        ASSERT_EQ(pixels[count], 7u);
+      }
+  });
 }
 
 }  // namespace
