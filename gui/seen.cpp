@@ -29,13 +29,6 @@ std::vector<std::string> shownChannels(const Layer& layer) {
   return result;
 }
 
-// Those that a layer takes of a picture.
-std::vector<std::string> namesOf(const Layer& layer, const std::string& alpha) {
-  std::vector<std::string> names = layer.channels;
-  if (!alpha.empty()) names.push_back(alpha);
-  return names;
-}
-
 // What the planes of some rows are filled from, and where they begin.
 struct Band {
   Box box;
@@ -105,6 +98,64 @@ void takeBand(const flat::Image& image, const std::vector<std::string>& channels
   if (!alpha.empty()) takePlane(image, alpha, band, seen, seen.alpha);
 }
 
+// Planes for a layer, to be filled. `zero`: where pixels may be left out.
+Seen planesFor(const Layer& layer, const std::string& alpha, const Box& box, int step, bool zero) {
+  Seen seen{layer, box, step, (box.width() + step - 1) / step, (box.height() + step - 1) / step};
+  const auto plane = [&] { return zero ? Buffer<float>(seen.pixels(), 0.0f) : Buffer<float>(seen.pixels()); };
+  const size_t planes = layer.kind == Kind::Count ? 1 : shownChannels(layer).size();
+  if (layer.kind == Kind::Identifier)
+    seen.ids = Buffer<uint32_t>(seen.pixels(), 0);
+  else
+    for (size_t c = 0; c < planes; ++c) seen.values.push_back(plane());
+  if (!alpha.empty() && layer.kind != Kind::Count && layer.kind != Kind::Identifier) seen.alpha = plane();
+  return seen;
+}
+
+void fillBand(const deep::DeepImage& image, const deep::DepthRange& clip, const std::string& alpha, const Band& band,
+              Seen& seen) {
+  const std::vector<std::string> channels = shownChannels(seen.layer);
+  if (seen.layer.kind == Kind::Count)
+    countBand(image, clip, band, seen);
+  else if (seen.layer.kind == Kind::Identifier)
+    identifyBand(image, clip, channels[0], band, seen);
+  else
+    compositeBand(image, clip, channels, alpha, band, seen);
+  if (!seen.spoiled.empty()) spoilBand(image, clip, band, seen);
+}
+
+// Puts `part` in place of what `whole` has from that column and row on.
+void copyInto(const Seen& part, int column, int row, Seen& whole) {
+  const auto copy = [&](const auto& from, auto& to) {
+    for (int y = 0; y < part.height && !from.empty(); ++y)
+      std::copy_n(from.data() + size_t(y) * size_t(part.width), part.width,
+                  to.data() + size_t(row + y) * size_t(whole.width) + size_t(column));
+  };
+  for (size_t c = 0; c < part.values.size(); ++c) copy(part.values[c], whole.values[c]);
+  copy(part.alpha, whole.alpha);
+  copy(part.ids, whole.ids);
+}
+
+// The pixels where the overlay lies, made again with it.
+void addOverlay(const deep::DeepImage& image, const Overlay& overlay, const deep::DepthRange& clip,
+                const std::string& alpha, const Progress& progress, Seen& seen) {
+  const Box there = intersect(seen.box, overlay.window());
+  if (there.empty()) return;
+  const int step = seen.step, column = (there.x0 - seen.box.x0 + step - 1) / step,
+            end = (there.y1 - seen.box.y0 + step - 1) / step;
+  std::vector<std::string> names = seen.layer.channels;
+  if (!alpha.empty()) names.push_back(alpha);
+  for (int row = (there.y0 - seen.box.y0 + step - 1) / step; row < end; row += kBandRows) {
+    if (progress.stop.stop_requested()) throw Cancelled();
+    const Box rows{seen.box.x0 + column * step, seen.box.y0 + row * step, there.x1,
+                   std::min(there.y1, seen.box.y0 + (row + kBandRows) * step)};
+    if (rows.empty()) continue;
+    const deep::DeepImage part = deep::insertPart(image, *overlay.volume, overlay.move, rows, step, names);
+    Seen made = planesFor(seen.layer, alpha, part.dataWindow, 1, false);
+    fillBand(part, clip, alpha, {part.dataWindow, 1, 0}, made);
+    copyInto(made, column, row, seen);
+  }
+}
+
 }  // namespace
 
 ptrdiff_t Seen::index(QPoint pixel) const {
@@ -116,46 +167,20 @@ Seen see(const Picture& picture, const std::string& layerName, const deep::Depth
          const Progress& progress, const Overlay* overlay) {
   const Layer* layer = picture.layer(layerName);
   if (!layer) fail("{}: no channel to show", picture.path);
-  Seen seen{*layer, box, step, (box.width() + step - 1) / step, (box.height() + step - 1) / step};
-  const std::vector<std::string> channels = shownChannels(*layer);
   const std::string alpha = alphaOf(picture, *layer);
-  const size_t planes = layer->kind == Kind::Count ? 1 : channels.size();
-  const auto plane = [&] {  // compositing writes all of it
-    return picture.deep() ? Buffer<float>(seen.pixels()) : Buffer<float>(seen.pixels(), 0.0f);
-  };
-  if (layer->kind == Kind::Identifier)
-    seen.ids = Buffer<uint32_t>(seen.pixels(), 0);
-  else
-    for (size_t c = 0; c < planes; ++c) seen.values.push_back(plane());
-  const bool composited = layer->kind != Kind::Count && layer->kind != Kind::Identifier;
-  if (!alpha.empty() && composited) seen.alpha = plane();
-
-  const bool spoiled = picture.deep() && layer->nonFinite && layer->kind != Kind::Depth;
-  if (spoiled) seen.spoiled = Buffer<uint8_t>(seen.pixels(), 0);
+  Seen seen = planesFor(*layer, alpha, box, step, !picture.deep());
+  if (picture.deep() && layer->nonFinite && layer->kind != Kind::Depth)
+    seen.spoiled = Buffer<uint8_t>(seen.pixels(), 0);
   for (int row = 0; row < seen.height; row += kBandRows) {
     progress.at(double(row) / seen.height);
     const Box rows{box.x0, box.y0 + row * step, box.x1, std::min(box.y1, box.y0 + (row + kBandRows) * step)};
-    Band band{rows, step, size_t(row) * size_t(seen.width)};
-    if (!picture.deep()) {
-      takeBand(*picture.flat(), channels, alpha, band, seen);
-      continue;
-    }
-    const deep::DeepImage* image = picture.deep();
-    deep::DeepImage part;
-    if (overlay && !intersect(rows, overlay->window()).empty()) {
-      part = deep::insertPart(*image, *overlay->volume, overlay->move, rows, step, namesOf(*layer, alpha));
-      image = &part;
-      band.box = part.dataWindow;
-      band.step = 1;
-    }
-    if (layer->kind == Kind::Count)
-      countBand(*image, clip, band, seen);
-    else if (layer->kind == Kind::Identifier)
-      identifyBand(*image, clip, channels[0], band, seen);
+    const Band band{rows, step, size_t(row) * size_t(seen.width)};
+    if (picture.deep())
+      fillBand(*picture.deep(), clip, alpha, band, seen);
     else
-      compositeBand(*image, clip, channels, alpha, band, seen);
-    if (spoiled) spoilBand(*image, clip, band, seen);
+      takeBand(*picture.flat(), shownChannels(*layer), alpha, band, seen);
   }
+  if (overlay && picture.deep()) addOverlay(*picture.deep(), *overlay, clip, alpha, progress, seen);
   return seen;
 }
 
