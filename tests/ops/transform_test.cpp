@@ -13,6 +13,7 @@
 #include "deep/ops/merge.h"
 #include "deep/pick.h"
 #include "flat/error.h"
+#include "flat/progress.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {
