@@ -14,8 +14,8 @@ namespace {
 PicturePtr makePicture(int width, int height) {
   const Box window{0, 0, width, height};
   flat::Image image{window, window, {}, {}};
-  Buffer<float>&red = image.add("R").values, &green = image.add("G").values;
-  image.add("B", 0.0f);
+  for (const char* name : {"R", "G", "B"}) image.add(name, 0.0f);
+  Buffer<float>&red = image.find("R")->values, &green = image.find("G")->values;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       red[window.index(x, y)] = float(x % 256) / 255;
