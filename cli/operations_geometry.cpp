@@ -61,7 +61,7 @@ Operation makeInsert(const Arguments& arguments, std::span<const InputForm> inpu
   const deep::Resampling pixels = how.resampling(deepOf(inputs[1].image).displayWindow);
   Operation operation;
   operation.apply = [=](std::vector<AnyImage> in) -> AnyImage {
-    return deep::insert(std::move(deepOf(in[0])), std::move(deepOf(in[1])), how);
+    return deep::insert(deepOf(in[0]), std::move(deepOf(in[1])), how);
   };
   operation.window = [=](std::span<const Box> windows) {
     return unionOf(windows[0], resampledWindow(windows[1], pixels));

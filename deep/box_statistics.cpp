@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "deep/row_weights.h"
-#include "deep/volume.h"
+#include "deep/sample_depths.h"
 #include "flat/finite.h"
 #include "flat/parallel.h"
 
@@ -37,10 +37,7 @@ struct Row {
 class RowSums {
  public:
   RowSums(const DeepImage& image, const std::array<std::string, 3>& colour)
-      : image_(image),
-        z_(image.get("Z")),
-        zBack_(image.tryGet("ZBack")),
-        colour_{image.get(colour[0]), image.get(colour[1]), image.get(colour[2])} {}
+      : image_(image), depths_(image), colour_{image.get(colour[0]), image.get(colour[1]), image.get(colour[2])} {}
 
   Row of(size_t begin, size_t end) const {
     RowCompositor compositor(image_);
@@ -59,7 +56,7 @@ class RowSums {
 
  private:
   void add(size_t sample, double seen, double weight, Bin& bin, std::array<double, 3>& sum) const {
-    const Range range = usableRange(z_[sample], zBack_.empty() ? z_[sample] : zBack_[sample]);
+    const Range range = depths_[sample];
     ++bin.sum.pixels;
     bin.sum.alpha += seen;
     if (std::isfinite(range.z)) {
@@ -74,7 +71,7 @@ class RowSums {
   }
 
   const DeepImage& image_;
-  std::span<const float> z_, zBack_;
+  SampleDepths depths_;
   std::array<std::span<const float>, 3> colour_;
 };
 

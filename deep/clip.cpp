@@ -6,8 +6,8 @@
 
 #include "deep/channels.h"
 #include "deep/ops/sample_plan.h"
+#include "deep/sample_depths.h"
 #include "deep/tidy.h"
-#include "deep/volume.h"
 
 namespace fathom::deep {
 
@@ -23,16 +23,13 @@ struct Planes {
 };
 
 struct Samples {
-  const DeepImage& image;
-  std::span<const float> alpha, z, zBack;
-
-  explicit Samples(const DeepImage& of) : image(of), alpha(of.get("A")), z(of.get("Z")), zBack(of.tryGet("ZBack")) {}
-  Range range(size_t i) const { return usableRange(z[i], zBack.empty() ? z[i] : zBack[i]); }
+  std::span<const float> alpha;
+  SampleDepths depths;
 };
 
 // Adds what of a sample lies between the planes.
 void plan(const Samples& samples, size_t i, const Planes& planes, RowPlan& row) {
-  const Range range = samples.range(i);
+  const Range range = samples.depths[i];
   if (range.isPoint()) {
     if (planes.has(range.z)) row.keep(i);
     return;
@@ -51,7 +48,7 @@ void plan(const Samples& samples, size_t i, const Planes& planes, RowPlan& row) 
 // Clips with planesOf(x, y) at each pixel.
 template <class PlanesOf>
 DeepImage clipWith(const DeepImage& image, const PlanesOf& planesOf) {
-  const Samples samples(image);
+  const Samples samples{image.get("A"), SampleDepths(image)};
   return mapRows(image, [&](int y, RowPlan& row) {
     for (int x = image.dataWindow.x0; x < image.dataWindow.x1; ++x) {
       const size_t pixel = image.dataWindow.index(x, y);
@@ -71,9 +68,10 @@ DeepImage clip(const DeepImage& image, float near, float far) {
 }
 
 bool clipCuts(const DeepImage& image, float near, float far) {
-  const auto z = image.get("Z"), zBack = image.tryGet("ZBack");
-  for (size_t i = 0; i < zBack.size(); ++i) {
-    const Range range = usableRange(z[i], zBack[i]), inside = Planes{near, far}.within(range);
+  if (!image.find("ZBack")) return false;
+  const SampleDepths depths(image);
+  for (size_t i = 0; i < image.samples(); ++i) {
+    const Range range = depths[i], inside = Planes{near, far}.within(range);
     if (!range.isPoint() && inside.z < inside.zBack && !(inside == range)) return true;
   }
   return false;

@@ -49,16 +49,12 @@ Output::Kind kindOf(const std::string& name) {
   }
 }
 
-// Adds the planes to `result`.
-std::vector<Output> planOutputs(const DeepImage& image, std::vector<std::string> names, flat::Image& result) {
+std::vector<Output> planOutputs(const DeepImage& image, const std::vector<std::string>& channels,
+                                std::span<float* const> planes) {
   std::vector<Output> outputs;
-  names.emplace_back("A");
-  for (const std::string& name : names) {
-    if (result.find(name)) continue;
-    const float* values = image.get(name).data();
-    result.planes.push_back({name, Buffer<float>(result.dataWindow.area())});
-    outputs.push_back({kindOf(name), values, result.planes.back().values.data()});
-  }
+  for (size_t c = 0; c < channels.size(); ++c)
+    outputs.push_back({kindOf(channels[c]), image.get(channels[c]).data(), planes[c]});
+  outputs.push_back({Output::Kind::Alpha, image.get("A").data(), planes[channels.size()]});
   return outputs;
 }
 
@@ -124,11 +120,10 @@ void write(const Plan& plan, PixelView& view, size_t pixel, size_t to) {
 
 }  // namespace
 
-flat::Image clipView(const DeepImage& image, const Box& box, int step, const DepthRange& range,
-                     const std::vector<std::string>& channels) {
+void clipViewInto(const DeepImage& image, const Box& box, int step, const DepthRange& range,
+                  const std::vector<std::string>& channels, std::span<float* const> planes) {
   const Box window{0, 0, (box.width() + step - 1) / step, (box.height() + step - 1) / step};
-  flat::Image result{window, window, {}, {}};
-  const Plan plan(planOutputs(image, channels, result));
+  const Plan plan(planOutputs(image, channels, planes));
   (void)PixelView(image, range);  // throws for images without rows, too
   parallelRanges(0, window.height(), kRows, [&](int y0, int y1) {
     PixelView view(image, range);
@@ -142,6 +137,20 @@ flat::Image clipView(const DeepImage& image, const Box& box, int step, const Dep
           for (const Output& output : plan.outputs) output.out[to] = 0;
       }
   });
+}
+
+flat::Image clipView(const DeepImage& image, const Box& box, int step, const DepthRange& range,
+                     const std::vector<std::string>& channels) {
+  const Box window{0, 0, (box.width() + step - 1) / step, (box.height() + step - 1) / step};
+  flat::Image result{window, window, {}, {}};
+  std::vector<std::string> names;
+  for (const std::string& channel : channels)
+    if (channel != "A" && std::ranges::find(names, channel) == names.end()) names.push_back(channel);
+  for (const std::string& name : names) result.planes.push_back({name, Buffer<float>(window.area())});
+  result.planes.push_back({"A", Buffer<float>(window.area())});
+  std::vector<float*> planes;
+  for (flat::Plane& plane : result.planes) planes.push_back(plane.values.data());
+  clipViewInto(image, box, step, range, names, planes);
   return result;
 }
 

@@ -1,6 +1,7 @@
 // What a deep image shows between two depths, fast enough to follow a plane that is dragged.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,5 +23,10 @@ namespace fathom::deep {
 // Throws Error where A, Z or a channel is missing, where one is UINT, and where volumes overlap too much (see `tidy`).
 flat::Image clipView(const DeepImage& image, const Box& box, int step, const DepthRange& range,
                      const std::vector<std::string>& channels);
+
+// The same, into planes that are there: one for each of the channels, which are different ones without A, and one for A,
+// which comes last. Rows follow one another.
+void clipViewInto(const DeepImage& image, const Box& box, int step, const DepthRange& range,
+                  const std::vector<std::string>& channels, std::span<float* const> planes);
 
 }  // namespace fathom::deep

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "deep/alpha.h"
-#include "deep/volume.h"
+#include "deep/sample_depths.h"
 #include "flat/error.h"
 #include "flat/parallel.h"
 
@@ -101,11 +101,12 @@ double fractionBefore(const Range& range, float depth) {
 }
 
 std::vector<Contribution> contributionsOf(const DeepImage& image, size_t pixel, float near, float far) {
-  const auto alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");
+  const auto alpha = image.get("A");
+  const SampleDepths depths(image);
   std::vector<Contribution> result;
   double passed = 1;
   for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i) {
-    const Range range = usableRange(z[i], zBack.empty() ? z[i] : zBack[i]);
+    const Range range = depths[i];
     const double a = opacity(alpha[i]), before = fractionBefore(range, near),
                  inside = fractionBefore(range, far) - before;
     if (inside > 0) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "deep/row_weights.h"
+#include "deep/sample_depths.h"
 #include "flat/parallel.h"
 #include "flat/progress.h"
 
@@ -15,15 +16,6 @@ namespace {
 constexpr int kRows = 16;  // of a tile, which has a histogram of its own
 constexpr double kDecades = 1e9;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-struct Depths {
-  std::span<const float> z, zBack;
-
-  explicit Depths(const DeepImage& image) : z(image.get("Z")), zBack(image.tryGet("ZBack")) {
-    if (zBack.empty()) zBack = z;
-  }
-  Range range(size_t i) const { return usableRange(z[i], zBack[i]); }
-};
 
 // The smallest and largest depths; where there is none the first is the larger.
 struct Extent {
@@ -81,15 +73,15 @@ class Spreader {
 }  // namespace
 
 DepthAxis axisOf(const DeepImage& image, bool logarithmic) {
-  const Depths depths(image);
+  const SampleDepths depths(image);
   const int height = image.dataWindow.height();
   std::vector<Extent> tiles(size_t(height / kRows + 1));
   parallelRanges(0, height, kRows, [&](int y0, int y1) {
     const size_t width = size_t(image.dataWindow.width());
     Extent extent;
     for (size_t i = image.offsets[size_t(y0) * width]; i < image.offsets[size_t(y1) * width]; ++i) {
-      extent.put(double(depths.range(i).z), logarithmic);
-      extent.put(double(depths.range(i).zBack), logarithmic);
+      extent.put(double(depths[i].z), logarithmic);
+      extent.put(double(depths[i].zBack), logarithmic);
     }
     tiles[size_t(y0 / kRows)] = extent;
   });
@@ -100,7 +92,7 @@ DepthAxis axisOf(const DeepImage& image, bool logarithmic) {
 
 std::vector<double> depthHistogram(const DeepImage& image, const DepthAxis& axis, int bins, DepthWeight weight,
                                    const std::stop_token& stop) {
-  const Depths depths(image);
+  const SampleDepths depths(image);
   if (weight == DepthWeight::Seen) (void)RowCompositor(image);  // throws for images without rows, too
   const int height = image.dataWindow.height();
   const size_t width = size_t(image.dataWindow.width());
@@ -108,7 +100,7 @@ std::vector<double> depthHistogram(const DeepImage& image, const DepthAxis& axis
   const auto fill = [&](int y0, int y1) {
     Spreader spreader(axis, bins);
     for (size_t i = image.offsets[size_t(y0) * width]; i < image.offsets[size_t(y1) * width]; ++i)
-      spreader.put(depths.range(i), 1);
+      spreader.put(depths[i], 1);
     return spreader.take();
   };
   const auto fillSeen = [&](int y0, int y1) {
@@ -118,7 +110,7 @@ std::vector<double> depthHistogram(const DeepImage& image, const DepthAxis& axis
       const std::vector<double>& seen = compositor.composite(pixel, pixel + width).seen;
       const size_t first = image.offsets[pixel];
       for (size_t i = 0; i < seen.size(); ++i)
-        if (seen[i] > 0) spreader.put(depths.range(first + i), seen[i]);
+        if (seen[i] > 0) spreader.put(depths[first + i], seen[i]);
     }
     return spreader.take();
   };

@@ -6,6 +6,7 @@
 
 #include "deep/channels.h"
 #include "deep/pixel_pieces.h"
+#include "deep/sample_depths.h"
 #include "flat/finite.h"
 #include "flat/parallel.h"
 
@@ -16,13 +17,14 @@ namespace {
 constexpr int kColumns = 32;  // that one task takes
 
 struct Sources {
-  std::span<const float> alpha, z, zBack;
+  std::span<const float> alpha;
+  SampleDepths depths;
   std::vector<const float*> channels;
   bool mergePoints;
 };
 
 Sources sourcesOf(const DeepImage& image, const std::vector<std::string>& channels) {
-  Sources result{image.get("A"), image.get("Z"), image.tryGet("ZBack"), {}, !holdsStatistics(image)};
+  Sources result{image.get("A"), SampleDepths(image), {}, !holdsStatistics(image)};
   for (const std::string& name : channels) result.channels.push_back(image.get(name).data());
   return result;
 }
@@ -36,7 +38,7 @@ class Column {
   void rasterise(const DeepImage& image, size_t pixel) {
     for (std::vector<double>& cell : values_) std::ranges::fill(cell, 0);
     const size_t first = size_t(image.offsets[pixel]), count = image.count(pixel);
-    pieces_.set(from_.z.subspan(first, count), from_.zBack.empty() ? from_.zBack : from_.zBack.subspan(first, count));
+    pieces_.set(from_.depths.fronts(first, count), from_.depths.backs(first, count));
     pieces_.checkOverlaps(from_.mergePoints, image.dataWindow, pixel);
     pieces_.visit(from_.alpha.subspan(first, count), from_.mergePoints, [&](const Piece& piece) { put(piece, first); });
   }
@@ -105,12 +107,12 @@ flat::Image depthSlice(const DeepImage& image, int y, int x0, int x1, const Dept
 DepthExtent depthExtent(const DeepImage& image, int y) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   DepthExtent extent{kInfinity, -kInfinity};
-  const std::span<const float> z = image.get("Z"), zBack = image.tryGet("ZBack");
+  const SampleDepths depths(image);
   const Box& window = image.dataWindow;
   if (y < window.y0 || y >= window.y1) return extent;
   const size_t first = window.index(window.x0, y);
   for (size_t i = image.offsets[first]; i < image.offsets[first + size_t(window.width())]; ++i) {
-    const Range range = usableRange(z[i], zBack.empty() ? z[i] : zBack[i]);
+    const Range range = depths[i];
     if (!std::isfinite(range.z)) continue;
     extent.nearest = std::min(extent.nearest, range.z);
     extent.farthest = std::max(extent.farthest, range.zBack);

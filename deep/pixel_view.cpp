@@ -47,14 +47,7 @@ void MeanDepths::put(const Range& range, double seen) {
 }
 
 PixelView::PixelView(const DeepImage& image, const DepthRange& range)
-    : image_(image),
-      cut_(range),
-      alpha_(image.get("A")),
-      z_(image.get("Z")),
-      zBack_(image.tryGet("ZBack")),
-      mergePoints_(!holdsStatistics(image)) {
-  if (zBack_.empty()) zBack_ = z_;
-}
+    : image_(image), cut_(range), alpha_(image.get("A")), samples_(image), mergePoints_(!holdsStatistics(image)) {}
 
 // A sample has two parts at most.
 void PixelView::makeRoom(size_t samples) {
@@ -66,7 +59,7 @@ void PixelView::makeRoom(size_t samples) {
 
 bool PixelView::set(size_t pixel) {
   const uint64_t begin = image_.offsets[pixel], end = image_.offsets[pixel + 1];
-  const float *const z = z_.data(), *const zBack = zBack_.data(), *const alphas = alpha_.data();
+  const float *const z = samples_.z.data(), *const zBack = samples_.zBack.data(), *const alphas = alpha_.data();
   const bool mergePoints = mergePoints_;
   const RangeCut cut = cut_;
   makeRoom(end - begin);

@@ -9,6 +9,7 @@
 #include "deep/depth_range.h"
 #include "deep/image.h"
 #include "deep/pixel_pieces.h"
+#include "deep/sample_depths.h"
 
 namespace fathom::deep {
 
@@ -77,7 +78,8 @@ class PixelView {
 
   const DeepImage& image_;
   RangeCut cut_;
-  std::span<const float> alpha_, z_, zBack_;
+  std::span<const float> alpha_;
+  SampleDepths samples_;
   bool mergePoints_;
   size_t pixel_ = 0;
   bool tidy_ = true;

@@ -58,18 +58,15 @@ struct RowCompositor::Ends {
 RowCompositor::RowCompositor(const DeepImage& image, bool findEnds, double passes)
     : image_(image),
       alpha_(image.get("A")),
-      z_(image.get("Z")),
-      zBack_(image.tryGet("ZBack")),
+      depths_(image),
       mergePoints_(!holdsStatistics(image)),
       findEnds_(findEnds),
-      passes_(passes) {
-  if (zBack_.empty()) zBack_ = z_;
-}
+      passes_(passes) {}
 
 // The usual pixel, whose samples go from front to back and do not meet. False where they do: then the pixel is to be
 // done again.
 bool RowCompositor::compositeTidy(size_t begin, size_t end, Pixel& result) {
-  const float *const z = z_.data(), *const zBack = zBack_.data(), *const alphas = alpha_.data();
+  const float *const z = depths_.z.data(), *const zBack = depths_.zBack.data(), *const alphas = alpha_.data();
   double *const premultiplied = row_.premultiplied.data(), *const seen = row_.seen.data();
   const size_t rowBegin = rowBegin_;
   const bool mergePoints = mergePoints_;
@@ -93,7 +90,7 @@ void RowCompositor::compositeAny(size_t pixel, size_t begin, size_t end, Pixel& 
   const size_t count = end - begin, first = begin - rowBegin_;
   std::fill_n(row_.premultiplied.begin() + ptrdiff_t(first), count, 0.0);
   std::fill_n(row_.seen.begin() + ptrdiff_t(first), count, 0.0);
-  pieces_.set(z_.subspan(begin, count), zBack_.subspan(begin, count));
+  pieces_.set(depths_.fronts(begin, count), depths_.backs(begin, count));
   pieces_.checkOverlaps(mergePoints_, image_.dataWindow, pixel);
   pieces_.visit(alpha_.subspan(begin, count), mergePoints_, [&](const Piece& piece) {
     const double front = sum.put(piece.range, piece.alpha);
@@ -108,7 +105,7 @@ void RowCompositor::compositeAny(size_t pixel, size_t begin, size_t end, Pixel& 
 // The ends of a pixel that compositeTidy has composited.
 void RowCompositor::findEnds(size_t begin, size_t end, Ends& ends) const {
   for (size_t i = begin; i < end; ++i)
-    ends.put(usableRange(z_[i], zBack_[i]), opacity(alpha_[i]), row_.premultiplied[i - rowBegin_], passes_);
+    ends.put(depths_[i], opacity(alpha_[i]), row_.premultiplied[i - rowBegin_], passes_);
 }
 
 const RowWeights& RowCompositor::composite(size_t firstPixel, size_t endPixel) {

@@ -6,6 +6,7 @@
 
 #include "deep/image.h"
 #include "deep/pixel_pieces.h"
+#include "deep/sample_depths.h"
 
 namespace fathom::deep {
 
@@ -47,7 +48,8 @@ class RowCompositor {
   void findEnds(size_t begin, size_t end, Ends& ends) const;
 
   const DeepImage& image_;
-  std::span<const float> alpha_, z_, zBack_;
+  std::span<const float> alpha_;
+  SampleDepths depths_;
   bool mergePoints_, findEnds_;
   double passes_;
   size_t rowBegin_ = 0;  // the row's first sample

@@ -7,22 +7,16 @@
 #include <span>
 #include <vector>
 
-#include "deep/volume.h"
+#include "deep/sample_depths.h"
 #include "flat/parallel.h"
 
 namespace fathom::deep {
 
 namespace {
 
-struct Depths {
-  std::span<const float> z, zBack;  // zBack may be empty
-
-  Range range(size_t i) const { return usableRange(z[i], zBack.empty() ? z[i] : zBack[i]); }
-  bool before(size_t i, size_t j) const {
-    const Range a = range(i), b = range(j);
-    return a.z < b.z || (a.z == b.z && a.zBack < b.zBack);
-  }
-};
+bool isBefore(const Range& a, const Range& b) {
+  return a.z < b.z || (a.z == b.z && a.zBack < b.zBack);
+}
 
 // What is left of a sample's alpha.
 double remaining(const RangeCut& cut, const Range& sample, double alpha) {
@@ -52,13 +46,13 @@ size_t pixelsOf(const Box& box, int step) {
 }
 
 // The sample that is seen most, of those in `order`, front to back.
-uint64_t mostSeenOf(const std::vector<size_t>& order, const Depths& depths, std::span<const float> alpha,
+uint64_t mostSeenOf(const std::vector<size_t>& order, const SampleDepths& depths, std::span<const float> alpha,
                     const RangeCut& cut) {
   uint64_t best = kNoSample;
   double most = 0, passing = 1;
   for (const size_t i : order) {
     if (passing <= most) break;  // nothing behind is seen more
-    const double left = remaining(cut, depths.range(i), opacity(alpha[i]));
+    const double left = remaining(cut, depths[i], opacity(alpha[i]));
     if (left * passing > most) most = left * passing, best = i;
     passing *= 1 - left;
   }
@@ -68,7 +62,7 @@ uint64_t mostSeenOf(const std::vector<size_t>& order, const Depths& depths, std:
 }  // namespace
 
 Buffer<uint64_t> mostSeen(const DeepImage& image, const Box& box, int step, const DepthRange& range) {
-  const Depths depths{image.get("Z"), image.tryGet("ZBack")};
+  const SampleDepths depths(image);
   const auto alpha = image.get("A");
   const RangeCut cut(range);
   Buffer<uint64_t> result(pixelsOf(box, step), kNoSample);
@@ -76,7 +70,7 @@ Buffer<uint64_t> mostSeen(const DeepImage& image, const Box& box, int step, cons
     thread_local std::vector<size_t> order;
     order.resize(image.count(pixel));
     std::iota(order.begin(), order.end(), size_t(image.offsets[pixel]));
-    const auto before = [&](size_t i, size_t j) { return depths.before(i, j); };
+    const auto before = [&](size_t i, size_t j) { return isBefore(depths[i], depths[j]); };
     if (!std::ranges::is_sorted(order, before)) std::ranges::stable_sort(order, before);
     result[to] = mostSeenOf(order, depths, alpha, cut);
   });
@@ -89,18 +83,18 @@ Buffer<uint32_t> countSamples(const DeepImage& image, const Box& box, int step, 
     forPixels(image, box, step, [&](size_t to, size_t pixel) { result[to] = uint32_t(image.count(pixel)); });
     return result;
   }
-  const Depths depths{image.get("Z"), image.tryGet("ZBack")};
+  const SampleDepths depths(image);
   const RangeCut cut(range);
   forPixels(image, box, step, [&](size_t to, size_t pixel) {
     for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
-      if (cut.leavesAnything(depths.range(i))) ++result[to];
+      if (cut.leavesAnything(depths[i])) ++result[to];
   });
   return result;
 }
 
 Buffer<uint8_t> findNonFinite(const DeepImage& image, const Box& box, int step, const DepthRange& range,
                               const std::vector<std::string>& channels) {
-  const Depths depths{image.get("Z"), image.tryGet("ZBack")};
+  const SampleDepths depths(image);
   const RangeCut cut(range);
   std::vector<std::span<const float>> planes;
   for (const std::string& channel : channels) planes.push_back(image.get(channel));
@@ -110,7 +104,7 @@ Buffer<uint8_t> findNonFinite(const DeepImage& image, const Box& box, int step, 
   Buffer<uint8_t> result(pixelsOf(box, step), 0);
   forPixels(image, box, step, [&](size_t to, size_t pixel) {
     for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i)
-      if (isSpoiled(i) && cut.leavesAnything(depths.range(i))) result[to] = 1;
+      if (isSpoiled(i) && cut.leavesAnything(depths[i])) result[to] = 1;
   });
   return result;
 }

@@ -6,6 +6,7 @@
 #include <atomic>
 
 #include "deep/channels.h"
+#include "deep/sample_depths.h"
 #include "flat/error.h"
 #include "flat/parallel.h"
 
@@ -13,25 +14,16 @@ namespace fathom::deep {
 
 namespace {
 
-struct Depths {
-  std::span<const float> z, zBack;
-
-  explicit Depths(const DeepImage& image) : z(image.get("Z")), zBack(image.tryGet("ZBack")) {}
-  void load(const DeepImage& image, size_t pixel, PixelPieces& pieces) const {
-    const size_t first = image.offsets[pixel], count = image.count(pixel);
-    pieces.set(z.subspan(first, count), zBack.empty() ? zBack : zBack.subspan(first, count));
-  }
-};
-
 // Calls body(pieces, pixel) for every pixel, its depths loaded, rows in parallel.
 template <class Body>
 void forEachPixel(const DeepImage& image, const Body& body) {
-  const Depths depths(image);
+  const SampleDepths depths(image);
   const size_t width = size_t(image.dataWindow.width());
   parallelFor(0, image.dataWindow.height(), [&](int y) {
     PixelPieces pieces;
     for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel) {
-      depths.load(image, pixel, pieces);
+      const size_t first = image.offsets[pixel], count = image.count(pixel);
+      pieces.set(depths.fronts(first, count), depths.backs(first, count));
       body(pieces, pixel);
     }
   });

@@ -29,7 +29,8 @@ bool holds(const Box& outer, const Box& inner) {
 
 // But for where, how bright and beside what: planes of the one are of use to the other.
 bool showSame(const RenderRequest& a, const RenderRequest& b) {
-  return a.a == b.a && a.b == b.b && a.state.layer == b.state.layer && a.state.clip == b.state.clip;
+  return a.a == b.a && a.b == b.b && a.overlay == b.overlay && a.state.layer == b.state.layer &&
+         a.state.clip == b.state.clip;
 }
 
 int powerOfTwoUpTo(double value) {
@@ -53,6 +54,7 @@ Canvas::Canvas(Session& session, std::shared_ptr<const Display> display, QWidget
   connect(&renderer_, &Renderer::rendered, this, &Canvas::accept);
   connect(&renderer_, &Renderer::failed, this, &Canvas::refuse);
   connect(&session_, &Session::picturesChanged, this, &Canvas::follow);
+  connect(&session_, &Session::draftChanged, this, &Canvas::follow);
   connect(&session_, &Session::viewChanged, this, &Canvas::follow);
   connect(&session_, &Session::pixelChanged, this, [this] { update(); });
   connect(&session_, &Session::boxChanged, this, [this] { update(); });
@@ -95,6 +97,12 @@ Box Canvas::frame() const {
 RenderRequest Canvas::wanted() const {
   RenderRequest request{session_.a(), session_.b(), session_.view(), {}};
   Box all, seen;
+  if (const auto& draft = session_.draft(); draft && draft->layer == request.state.layer) {
+    request.a = draft->a;
+    request.b = draft->b;
+    request.overlay = draft->overlay;
+    all = draft->overlay->window();
+  }
   if (request.a) all = unionOf(all, request.a->dataWindow());
   if (request.b) all = unionOf(all, request.b->dataWindow());
   for (const Pane& pane : panes()) seen = unionOf(seen, viewport_.visible(pane.rect.size()));
@@ -166,7 +174,7 @@ void Canvas::accept(const Rendered& result) {
 
 // A picture that cannot be shown leaves nothing on the screen, rather than the one before it.
 void Canvas::refuse(const QString& reason) {
-  if (shown_.request.a != session_.a() || shown_.request.b != session_.b()) shown_ = {};
+  if (shown_.request.a != asked_.a || shown_.request.b != asked_.b) shown_ = {};
   update();
   session_.say(reason);
 }

@@ -36,7 +36,8 @@ void paintOutline(QPainter& painter, const Viewport& viewport, const Box& box, c
   pen.setCosmetic(true);
   painter.setPen(pen);
   painter.setBrush(Qt::NoBrush);
-  painter.drawRect(viewport.toScreen(box).adjusted(-0.5, -0.5, 0.5, 0.5));
+  const double half = 0.5 / painter.device()->devicePixelRatioF();  // of a pixel of the screen, which the pen is wide
+  painter.drawRect(viewport.toScreen(box).adjusted(-half, -half, half, half));
 }
 
 // A word on a dark ground, at the left or right upper corner of `rect`.

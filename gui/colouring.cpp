@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -65,19 +66,30 @@ Light lightOf(const Seen& seen, Isolate isolate, size_t first, size_t count, std
   return three(made.data());
 }
 
-// As RGBA pixels: value * gain + half the alpha of `base`, which may be null.
-void pack(const Light& light, size_t count, float gain, const float* base, std::vector<float>& rgba) {
+// Numbers in HALF's range, into `made`: value * gain + half the alpha of `base`, which may be null. Once where the three
+// are the same.
+Light scaled(const Light& light, size_t count, float gain, const float* base, std::vector<float>& made) {
   constexpr float kMost = 65504;
-  rgba.resize(4 * count);
-  for (size_t x = 0; x < count; ++x) {
-    for (size_t c = 0; c < 3; ++c)
-      rgba[4 * x + c] = std::clamp(finiteOrZero(light[c][x]) * gain + (base ? 0.5f * base[x] : 0.0f), -kMost, kMost);
-    rgba[4 * x + 3] = 1;
+  const size_t planes = light[0] == light[1] && light[1] == light[2] ? 1 : 3;
+  made.resize(planes * count);
+  for (size_t c = 0; c < planes; ++c) {
+    const float* from = light[c];
+    float* to = made.data() + c * count;
+    if (base)
+      for (size_t x = 0; x < count; ++x)
+        to[x] = std::clamp(finiteOrZero(from[x]) * gain + 0.5f * base[x], -kMost, kMost);
+    else
+      for (size_t x = 0; x < count; ++x) to[x] = std::clamp(finiteOrZero(from[x]) * gain, -kMost, kMost);
   }
+  return {made.data(), made.data() + (planes > 1 ? count : 0), made.data() + (planes > 1 ? 2 * count : 0)};
 }
 
 // What is no number, and what leaves [0,1] once it is multiplied by `gain`.
 void mark(const Light& light, size_t count, float gain, const DisplayParams& params, QRgb* to) {
+  bool finite = true;  // the usual row, told in one pass that compilers vectorise
+  for (const float* values : light)
+    for (size_t x = 0; x < count; ++x) finite &= std::abs(values[x]) <= std::numeric_limits<float>::max();
+  if (finite && !params.markClipped) return;
   for (size_t x = 0; x < count; ++x) {
     const float r = light[0][x], g = light[1][x], b = light[2][x];
     if (!(std::isfinite(r) && std::isfinite(g) && std::isfinite(b))) {
@@ -100,11 +112,10 @@ QImage colourLight(const Seen& seen, const ViewState& state, const Display& disp
   const size_t width = size_t(seen.width);
   const std::vector<float> covered(width, 1.0f);
   return makeRows(seen, [&](size_t first, QRgb* to) {
-    thread_local std::vector<float> made, rgba;
+    thread_local std::vector<float> made, ready;
     const Light light = lightOf(seen, state.isolate, first, width, made);
     const float* alpha = seen.alpha.empty() ? covered.data() : seen.alpha.data() + first;
-    pack(light, width, vector ? gain / 2 : gain, vector ? alpha : nullptr, rgba);
-    transform(rgba.data(), seen.width, to);
+    transform(scaled(light, width, vector ? gain / 2 : gain, vector ? alpha : nullptr, ready), seen.width, to);
     if (params.markClipped || params.markNan) mark(light, width, gain, params, to);
     if (!seen.spoiled.empty() && params.markNan)
       for (size_t x = 0; x < width; ++x)

@@ -65,8 +65,8 @@ SeenPtr Compositor::find(const PicturePtr& picture, const RenderRequest& request
   const Layer* layer = picture->layer(request.state.layer);
   for (const Kept& kept : kept_) {
     const Seen& seen = *kept.seen;
-    const bool sameClip = picture->flat() || kept.clip == request.state.clip;
-    if (kept.picture.lock() == picture && sameClip && layer && seen.layer.name == layer->name && seen.step == step &&
+    const bool same = picture->flat() || (kept.clip == request.state.clip && kept.overlay == request.overlay);
+    if (kept.picture.lock() == picture && same && layer && seen.layer.name == layer->name && seen.step == step &&
         seen.box == request.box)
       return kept.seen;
   }
@@ -76,11 +76,16 @@ SeenPtr Compositor::find(const PicturePtr& picture, const RenderRequest& request
 SeenPtr Compositor::seen(const PicturePtr& picture, const RenderRequest& request, int step, const Progress& progress) {
   if (SeenPtr there = find(picture, request, step)) return there;
   const auto begin = std::chrono::steady_clock::now();
-  SeenPtr made =
-      std::make_shared<const Seen>(see(*picture, request.state.layer, request.state.clip, request.box, step, progress));
+  SeenPtr made = std::make_shared<const Seen>(
+      see(*picture, request.state.layer, request.state.clip, request.box, step, progress, request.overlay.get()));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   if (made->pixels() >= kMeasurable) secondsPerPixel_ = took.count() / double(made->pixels());
-  kept_.push_front({picture, request.state.clip, made});
+  // What only another clip tells from it is of no more use: a plane that is dragged goes on.
+  std::erase_if(kept_, [&](const Kept& kept) {
+    return kept.picture.lock() == picture && kept.seen->layer.name == made->layer.name && kept.seen->step == step &&
+           kept.seen->box == request.box;
+  });
+  kept_.push_front({picture, request.state.clip, request.overlay, made});
   size_t bytes = 0;
   std::erase_if(kept_, [&](const Kept& kept) {
     bytes += bytesOf(*kept.seen);

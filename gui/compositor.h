@@ -19,6 +19,7 @@ struct RenderRequest {
   Box box;         // pixels of the image; may reach beyond the data window, where the result is black
   int step = 1;    // every step-th pixel of every step-th row
   int shrink = 1;  // a power of two: so many pixels across that were taken become one of the image, their average
+  OverlayPtr overlay = {};  // in A and B where they are deep; null: nothing
   bool operator==(const RenderRequest&) const = default;
 };
 
@@ -52,6 +53,7 @@ class Compositor {
   struct Kept {
     std::weak_ptr<const Picture> picture;
     deep::DepthRange clip;
+    OverlayPtr overlay;
     SeenPtr seen;
   };
   struct KeptRange {

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "deep/ops/sample.h"
@@ -46,6 +45,7 @@ QSize DepthPlot::sizeHint() const {
 void DepthPlot::show(const PixelSamples& samples) {
   const bool same = samples.picture == samples_.picture && samples.pixel == samples_.pixel;
   samples_ = samples;
+  bars_ = {};
   if (!same) {
     highlight_ = -1;
     fitAxis();
@@ -80,6 +80,11 @@ void DepthPlot::fitAxis() {
 
 QRectF DepthPlot::frame() const {
   return QRectF(rect()).adjusted(kLeft, kTop, -kRight, -kBottom);
+}
+
+// Where bars are seen; those at the sides reach out of the frame by half.
+QRectF DepthPlot::barArea() const {
+  return frame().adjusted(-kBar, -2, kBar, 2);
 }
 
 double DepthPlot::xOf(double depth) const {
@@ -129,7 +134,7 @@ void DepthPlot::paintEvent(QPaintEvent*) {
     return;
   }
   paintAxes(painter);
-  painter.setClipRect(frame().adjusted(-kBar, -2, kBar, 2));
+  painter.setClipRect(barArea());
   paintBars(painter);
   painter.setRenderHint(QPainter::Antialiasing);
   paintTransmittance(painter);
@@ -160,21 +165,38 @@ void DepthPlot::paintAxes(QPainter& painter) const {
   }
 }
 
-// Tall ones first, so that none hides another; an outline in a tone that is seen on every background.
-void DepthPlot::paintBars(QPainter& painter) const {
-  std::vector<int> order(samples_.samples.size());
-  std::iota(order.begin(), order.end(), 0);
+void DepthPlot::paintBar(QPainter& painter, int sample, const QPen& outline) const {
+  const PixelSample& of = samples_.samples[size_t(sample)];
+  QColor faint = fillOf(of);
+  faint.setAlphaF(0.25f);
+  painter.fillRect(bar(sample, of.alpha), faint);
+  painter.fillRect(bar(sample, of.seen), fillOf(of));
+  painter.setBrush(Qt::NoBrush);
+  painter.setPen(outline);
+  painter.drawRect(bar(sample, std::max(of.alpha, 0.01)));
+}
+
+// Those in view, tall ones first, so that none hides another; an outline in a tone that is seen on every background.
+QPixmap DepthPlot::makeBars(const BarsLook& look) const {
+  QPixmap pixmap(look.size * look.ratio);
+  pixmap.setDevicePixelRatio(look.ratio);
+  pixmap.fill(Qt::transparent);
+  std::vector<int> order;
+  for (int i = 0; i < int(samples_.samples.size()); ++i)
+    if (bar(i, 1).intersects(barArea())) order.push_back(i);
   std::ranges::stable_sort(order, std::ranges::greater(), [&](int i) { return samples_.samples[size_t(i)].alpha; });
-  for (const int i : order) {
-    const PixelSample& sample = samples_.samples[size_t(i)];
-    QColor faint = fillOf(sample);
-    faint.setAlphaF(0.25f);
-    painter.fillRect(bar(i, sample.alpha), faint);
-    painter.fillRect(bar(i, sample.seen), fillOf(sample));
-    painter.setBrush(Qt::NoBrush);
-    painter.setPen(i == highlight_ ? QPen(palette().color(QPalette::Highlight), 2) : QPen(between(palette(), 0.6), 1));
-    painter.drawRect(bar(i, std::max(sample.alpha, 0.01)));
-  }
+  QPainter painter(&pixmap);
+  for (const int i : order) paintBar(painter, i, QPen(between(palette(), 0.6), 1));
+  return pixmap;
+}
+
+// There may be thousands, and the mouse alone has the plot drawn again: they are kept as a picture.
+void DepthPlot::paintBars(QPainter& painter) {
+  const BarsLook look{axis_, size(), devicePixelRatioF(), palette().cacheKey()};
+  if (std::exchange(barsLook_, look) != look || bars_.isNull()) bars_ = makeBars(look);
+  painter.drawPixmap(0, 0, bars_);
+  if (highlight_ >= 0 && highlight_ < int(samples_.samples.size()))
+    paintBar(painter, highlight_, QPen(palette().color(QPalette::Highlight), 2));
 }
 
 void DepthPlot::paintTransmittance(QPainter& painter) {

@@ -3,6 +3,7 @@
 // shows all.
 #pragma once
 
+#include <QPixmap>
 #include <QWidget>
 #include <vector>
 
@@ -48,16 +49,29 @@ class DepthPlot : public QWidget {
     int steps = 0;
     bool operator==(const Curve&) const = default;
   };
+  // All that the bars depend on beside the samples.
+  struct BarsLook {
+    deep::DepthAxis axis;
+    QSize size;
+    double ratio = 0;  // pixels of the device per unit
+    qint64 palette = 0;
+    bool operator==(const BarsLook&) const = default;
+  };
   void fitAxis();
+  QRectF barArea() const;
   double xOf(double depth) const;
   double yOf(double value) const;
   int sampleAt(const QPointF& at) const;
   void paintAxes(QPainter& painter) const;
-  void paintBars(QPainter& painter) const;
+  void paintBars(QPainter& painter);
+  void paintBar(QPainter& painter, int sample, const QPen& outline) const;
+  QPixmap makeBars(const BarsLook& look) const;
   void paintTransmittance(QPainter& painter);
   void paintCaption(QPainter& painter) const;
 
   PixelSamples samples_;
+  BarsLook barsLook_;            // of `bars_`
+  QPixmap bars_;                 // none stands out; null: to be drawn anew
   Curve curve_;                  // that was drawn last
   std::vector<double> passing_;  // its values
   deep::DepthRange clip_;

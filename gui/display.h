@@ -2,6 +2,7 @@
 #pragma once
 
 #include <QRgb>
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
@@ -11,8 +12,9 @@
 
 namespace fathom::gui {
 
-// Turns RGBA pixels into opaque ones; from any number of threads at once. Values must be finite.
-using RowTransform = std::function<void(const float* rgba, int pixels, QRgb* to)>;
+// Turns pixels, R, G and B by plane, into opaque ones; from any number of threads at once. Values must be within the
+// range of HALF.
+using RowTransform = std::function<void(const std::array<const float*, 3>& rgb, int pixels, QRgb* to)>;
 
 class Display {
  public:
@@ -32,7 +34,11 @@ class Display {
 
   // Display, view, look and gamma; the exposure is the caller's. An empty or unknown display or view means the default;
   // an empty look means the view's own. Throws Error where the config's transform cannot be made.
-  RowTransform transform(const DisplayParams& params) const;
+  //
+  // A transform that treats each channel by itself is made a table where one is true to it: before they are rounded, its
+  // values are less than half a step of 8 bits from those of OpenColorIO. The last ones that were made are kept.
+  // `exactly`: never a table.
+  RowTransform transform(const DisplayParams& params, bool exactly = false) const;
   // Gamma alone: for what is shown but is no light.
   RowTransform plainTransform(float gamma) const;
 

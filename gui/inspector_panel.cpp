@@ -11,14 +11,7 @@ namespace fathom::gui {
 
 namespace {
 
-constexpr int kSoon = 12;              // milliseconds
-constexpr size_t kManySamples = 2000;  // from where on the window would wait for them
-
-size_t countAt(const PicturePtr& picture, const std::optional<QPoint>& pixel) {
-  const deep::DeepImage* image = picture ? picture->deep() : nullptr;
-  if (!image || !pixel || !image->dataWindow.contains(pixel->x(), pixel->y())) return 0;
-  return image->count(image->dataWindow.index(pixel->x(), pixel->y()));
-}
+constexpr int kSoon = 12;  // milliseconds
 
 QToolButton* makeButton(QAction* action, QWidget* parent) {
   auto* button = new QToolButton(parent);

@@ -59,6 +59,12 @@ void addFlat(const flat::Image& image, const std::vector<std::string>& colour, f
 
 }  // namespace
 
+size_t countAt(const PicturePtr& picture, std::optional<QPoint> pixel) {
+  const deep::DeepImage* image = picture ? picture->deep() : nullptr;
+  if (!image || !pixel || !image->dataWindow.contains(pixel->x(), pixel->y())) return 0;
+  return image->count(image->dataWindow.index(pixel->x(), pixel->y()));
+}
+
 double PixelSamples::alpha() const {
   double sum = 0;
   for (const PixelSample& sample : samples) sum += sample.seen;
@@ -66,13 +72,8 @@ double PixelSamples::alpha() const {
 }
 
 std::vector<std::string> colourChannels(const Picture& picture, const std::string& layer) {
-  // A draft does not have the channels of all its layers.
-  const auto isThere = [&](const std::string& channel) {
-    return picture.deep() ? picture.deep()->find(channel) != nullptr : picture.flat()->find(channel) != nullptr;
-  };
-  const auto coloured = [&](const Layer* of) {
-    return of && of->kind == Layer::Kind::Colour && of->channels.size() > 2 &&
-           std::ranges::all_of(of->channels, isThere);
+  const auto coloured = [](const Layer* of) {
+    return of && of->kind == Layer::Kind::Colour && of->channels.size() > 2;
   };
   const Layer* found = picture.layer(layer);
   if (!coloured(found)) found = picture.layer("RGBA");  // or the first

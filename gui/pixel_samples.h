@@ -4,6 +4,7 @@
 #include <QColor>
 #include <QPoint>
 #include <QString>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,12 @@
 #include "gui/picture.h"
 
 namespace fathom::gui {
+
+// Samples of a pixel from where on the window would wait for what is found out about them.
+inline constexpr size_t kManySamples = 2000;
+
+// How many a pixel of a deep picture has; 0 where there is none.
+size_t countAt(const PicturePtr& picture, std::optional<QPoint> pixel);
 
 struct PixelSample {
   deep::Range range;           // as compositing takes it

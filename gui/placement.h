@@ -1,8 +1,10 @@
-// A volume, or any deep image, that is placed in A, and in B where that is deep: moved and scaled while one looks.
+// A volume, or any deep image, that is placed in A, and in B where that is deep: moved and scaled while one looks. While it
+// moves the screen shows a draft, which costs what is seen of it; once it rests, its samples go among all others.
 #pragma once
 
 #include <QObject>
 #include <QString>
+#include <QTimer>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,7 +34,8 @@ class Placement : public QObject {
   std::string file() const;
   const deep::Transform& transform() const { return transform_; }
   const PlacedDepths& depths() const { return depths_; }
-  bool busy() const { return background_.busy(); }
+  // Until all samples are where they belong.
+  bool busy() const { return background_.busy() || rest_.isActive(); }
 
  public slots:
   // A file or a pattern; takes the place of the one before. From now on A and B are shown with it.
@@ -55,8 +58,11 @@ class Placement : public QObject {
     PicturePtr a;  // what `depths` are of, beside the volume
     PlacedDepths depths;
   };
-  // A draft has the channels that are seen only; the whole follows when the volume rests.
-  void place(bool draft = false);
+  void draft();
+  void place();
+  void delivered(const PlacedDepths& depths);
+  static const deep::DeepImage& volumeOf(Read& read, const std::string& path, const PicturePtr& a, size_t memory,
+                                         const Progress& progress);
 
   Session& session_;
   Frames& frames_;
@@ -65,6 +71,8 @@ class Placement : public QObject {
   PlacedDepths depths_;
   PicturePtr a_, b_;            // as they were read
   std::shared_ptr<Read> read_;  // touched by the work in the background only
+  bool whole_ = false;          // what runs puts all samples together, and takes its time
+  QTimer rest_;                 // what is left of the moment without a move after which that begins
   Background background_;
 };
 

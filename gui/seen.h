@@ -8,6 +8,7 @@
 
 #include "deep/clip_view.h"
 #include "flat/progress.h"
+#include "gui/overlay.h"
 #include "gui/picture.h"
 
 namespace fathom::gui {
@@ -30,10 +31,10 @@ struct Seen {
 };
 using SeenPtr = std::shared_ptr<const Seen>;
 
-// A deep picture as `clip` leaves it, a flat one as it is; 0 outside of the data window. Throws Error, and Cancelled between
-// rows.
+// A deep picture as `clip` leaves it, with the overlay's volume in it where there is one; a flat one as it is; 0 outside of
+// the data window. Throws Error, and Cancelled between rows.
 Seen see(const Picture& picture, const std::string& layer, const deep::DepthRange& clip, const Box& box, int step,
-         const Progress& progress = {});
+         const Progress& progress = {}, const Overlay* overlay = nullptr);
 
 // A pixel's values in words, with the channel's name ("R", "id"), to so many digits; identifiers and counts in full.
 struct NamedValue {

@@ -16,7 +16,13 @@ bool assign(T& to, T value) {
 
 void Session::setPictures(PicturePtr a, PicturePtr b) {
   const bool isNewA = assign(a_, std::move(a)), isNewB = assign(b_, std::move(b));
-  if (isNewA || isNewB) emit picturesChanged();
+  const bool hadDraft = std::exchange(draft_, std::nullopt).has_value();
+  if (isNewA || isNewB || hadDraft) emit picturesChanged();
+}
+
+void Session::setDraft(Draft draft) {
+  draft_ = std::move(draft);
+  emit draftChanged();
 }
 
 void Session::setView(const ViewState& view) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "flat/box.h"
+#include "gui/overlay.h"
 #include "gui/picture.h"
 #include "gui/view_state.h"
 
@@ -22,6 +23,8 @@ class Session : public QObject {
 
   const PicturePtr& a() const { return a_; }  // null before anything is open
   const PicturePtr& b() const { return b_; }  // what A is compared with; null: nothing
+  // What the screen shows instead for a moment; all else goes on as if there were none.
+  const std::optional<Draft>& draft() const { return draft_; }
   // What is looked at in numbers: B where it alone is shown, else A.
   const PicturePtr& seen() const { return view_.comparison == Comparison::B && b_ ? b_ : a_; }
   const ViewState& view() const { return view_; }
@@ -34,8 +37,9 @@ class Session : public QObject {
 
   void setA(PicturePtr picture) { setPictures(std::move(picture), b_); }
   void setB(PicturePtr picture) { setPictures(a_, std::move(picture)); }
-  // Both at once: nobody sees the one with the other's predecessor.
+  // Both at once: nobody sees the one with the other's predecessor. They take the place of a draft.
   void setPictures(PicturePtr a, PicturePtr b);
+  void setDraft(Draft draft);
   void setView(const ViewState& view);
   void setCursor(std::optional<QPoint> pixel);
   void setPin(std::optional<QPoint> pixel);
@@ -46,6 +50,7 @@ class Session : public QObject {
  signals:
   // Only on a change.
   void picturesChanged();
+  void draftChanged();  // another one; that it is gone is told by the other signal
   void viewChanged();
   void pixelChanged();  // or whether it is pinned
   void boxChanged();
@@ -53,6 +58,7 @@ class Session : public QObject {
 
  private:
   PicturePtr a_, b_;
+  std::optional<Draft> draft_;
   ViewState view_;
   std::optional<QPoint> cursor_, pin_;
   std::optional<Box> box_;

@@ -1,7 +1,11 @@
 #include "gui/theme.h"
 
 #include <QApplication>
+#include <QIcon>
+#include <QPainter>
 #include <QPalette>
+#include <QPolygonF>
+#include <QProxyStyle>
 #include <QStyleFactory>
 
 namespace fathom::gui {
@@ -35,10 +39,38 @@ QPalette darkPalette() {
   return palette;
 }
 
+// What a bar shows where it has more than there is room for.
+QIcon moreIcon() {
+  constexpr int kSize = 12;
+  const double ratio = qGuiApp->devicePixelRatio();
+  QPixmap pixmap(QSize(kSize, kSize) * ratio);
+  pixmap.setDevicePixelRatio(ratio);
+  pixmap.fill(Qt::transparent);
+  QPainter painter(&pixmap);
+  painter.setRenderHint(QPainter::Antialiasing);
+  painter.setPen(QPen(darkPalette().color(QPalette::ButtonText), 1.5));
+  for (const double left : {2.0, 6.0}) painter.drawPolyline(QPolygonF({{left, 2}, {left + 4, 6}, {left, 10}}));
+  return QIcon(pixmap);
+}
+
+// Fusion, whose own sign for that is black whatever the palette.
+class DarkStyle : public QProxyStyle {
+ public:
+  DarkStyle() : QProxyStyle(QStyleFactory::create("Fusion")) {}
+
+  QIcon standardIcon(StandardPixmap which, const QStyleOption* option, const QWidget* widget) const override {
+    return which == SP_ToolBarHorizontalExtensionButton ? moreIcon() : QProxyStyle::standardIcon(which, option, widget);
+  }
+};
+
 }  // namespace
 
+std::unique_ptr<QStyle> makeStyle() {
+  return std::make_unique<DarkStyle>();
+}
+
 void applyTheme(QApplication& application) {
-  application.setStyle(QStyleFactory::create("Fusion"));
+  application.setStyle(makeStyle().release());
   application.setPalette(darkPalette());
   application.setStyleSheet(
       "QToolBar { border: 0; spacing: 4px; padding: 2px; } QDockWidget::title { padding: 4px; }"

@@ -12,6 +12,7 @@
 #include "deep/flatten.h"
 #include "deep/ops/sample_plan.h"
 #include "deep/pixel_pieces.h"
+#include "deep/sample_depths.h"
 #include "deep/tidy.h"
 #include "flat/error.h"
 
@@ -21,10 +22,10 @@ namespace {
 
 struct Samples {
   const DeepImage& image;
-  std::span<const float> alpha, z, zBack;
+  std::span<const float> alpha;
+  SampleDepths depths;
 
-  explicit Samples(const DeepImage& of) : image(of), alpha(of.get("A")), z(of.get("Z")), zBack(of.tryGet("ZBack")) {}
-  Range range(size_t i) const { return usableRange(z[i], zBack.empty() ? z[i] : zBack[i]); }
+  explicit Samples(const DeepImage& of) : image(of), alpha(of.get("A")), depths(of) {}
 };
 
 // The samples of one pixel, from `next` on.
@@ -69,7 +70,7 @@ class PixelHoldout {
     hides_ = false;
     float end = -std::numeric_limits<float>::infinity();
     for (size_t i = own.next; i < own.end; ++i) {
-      ranges_.push_back(image_.range(i));
+      ranges_.push_back(image_.depths[i]);
       end = std::max(end, ranges_.back().zBack);
     }
     size_t next = 0;
@@ -78,7 +79,7 @@ class PixelHoldout {
       ++next;
     };
     for (; !other.empty(); ++other.next) {
-      const Range range = holdout_.range(other.next);
+      const Range range = holdout_.depths[other.next];
       while (next < ranges_.size() && ranges_[next].z <= range.z) addOwn();
       if (opacity(holdout_.alpha[other.next]) == 0 || range.z > end) continue;
       hides_ = true;
@@ -150,8 +151,7 @@ class PixelOpacity {
     const Run run = runAt(samples_.image, x, y);
     if (run.empty()) return {};
     const size_t count = run.end - run.next;
-    pieces_.set(samples_.z.subspan(run.next, count),
-                samples_.zBack.empty() ? samples_.zBack : samples_.zBack.subspan(run.next, count));
+    pieces_.set(samples_.depths.fronts(run.next, count), samples_.depths.backs(run.next, count));
     pieces_.checkOverlaps(true, samples_.image.dataWindow, samples_.image.dataWindow.index(x, y));
     passed_ = 1;
     reached_.reset();
@@ -203,7 +203,7 @@ DeepImage hardHoldout(const DeepImage& image, const DeepImage& holdout, double o
       row.nextPixel();
       const std::optional<Reached> reached = opacity.find(x, y);
       for (Run run = runAt(image, x, y); !run.empty(); ++run.next)
-        if (!reached || !reached->hides(own.range(run.next).z)) row.keep(run.next);
+        if (!reached || !reached->hides(own.depths[run.next].z)) row.keep(run.next);
     }
   });
 }

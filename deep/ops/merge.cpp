@@ -6,13 +6,16 @@
 #include <tuple>
 
 #include "deep/channels.h"
-#include "deep/volume.h"
+#include "deep/sample_depths.h"
 #include "flat/error.h"
 #include "flat/parallel.h"
+#include "flat/progress.h"
 
 namespace fathom::deep {
 
 namespace {
+
+using Images = std::span<const DeepImage* const>;
 
 // Which sample of which input; the order of numbers is that of the inputs.
 struct Origin {
@@ -40,11 +43,9 @@ struct Placed {
 // One input as the merge reads it.
 struct Input {
   const DeepImage& image;
-  std::span<const float> z, zBack;
+  SampleDepths depths;
 
-  explicit Input(const DeepImage& from) : image(from), z(from.get("Z")), zBack(from.tryGet("ZBack")) {
-    if (zBack.empty()) zBack = z;
-  }
+  explicit Input(const DeepImage& from) : image(from), depths(from) {}
 };
 
 // The samples of one pixel of the result, front to back, in `placed`. Each input's are mostly so already: they are
@@ -56,9 +57,9 @@ void placePixel(std::span<const Input> inputs, int x, int y, std::vector<Placed>
     const DeepImage& image = inputs[i].image;
     if (!image.dataWindow.contains(x, y)) continue;
     const size_t pixel = image.dataWindow.index(x, y), before = placed.size();
-    const float *const z = inputs[i].z.data(), *const zBack = inputs[i].zBack.data();
+    const SampleDepths depths = inputs[i].depths;
     for (size_t s = image.offsets[pixel]; s < image.offsets[pixel + 1]; ++s)
-      placed.emplace_back(usableRange(z[s], zBack[s]), Origin(i, s));
+      placed.emplace_back(depths[s], Origin(i, s));
     const auto run = placed.begin() + std::ptrdiff_t(before);
     if (!std::is_sorted(run, placed.end())) std::sort(run, placed.end());
     if (before == 0 || run == placed.end() || run[-1] < *run) continue;
@@ -68,8 +69,8 @@ void placePixel(std::span<const Input> inputs, int x, int y, std::vector<Placed>
   }
 }
 
-bool everyInputHas(std::span<const DeepImage> inputs, const std::string& name) {
-  return std::ranges::all_of(inputs, [&](const DeepImage& image) { return image.find(name) != nullptr; });
+bool everyInputHas(Images inputs, const std::string& name) {
+  return std::ranges::all_of(inputs, [&](const DeepImage* image) { return image->find(name) != nullptr; });
 }
 
 // Whether the result has a channel that only some inputs have.
@@ -82,10 +83,10 @@ struct NamedType {
   PixelType type;
 };
 
-std::vector<NamedType> channelsOf(std::span<const DeepImage> inputs) {
+std::vector<NamedType> channelsOf(Images inputs) {
   std::vector<NamedType> result;
-  for (const DeepImage& image : inputs)
-    for (const Channel& channel : image.channels) {
+  for (const DeepImage* image : inputs)
+    for (const Channel& channel : image->channels) {
       const auto found = std::ranges::find(result, channel.name, &NamedType::name);
       if (found == result.end()) {
         if (staysAlone(channel) || everyInputHas(inputs, channel.name)) result.push_back({channel.name, channel.type});
@@ -107,12 +108,12 @@ void take(std::span<const Origin> origins, std::span<const T* const> from, T* ou
   }
 }
 
-void takeRow(std::span<const DeepImage> inputs, std::span<const Origin> origins, Channel& channel, size_t at) {
+void takeRow(Images inputs, std::span<const Origin> origins, Channel& channel, size_t at) {
   std::vector<const float*> values;
   std::vector<const uint32_t*> ids;
-  for (const DeepImage& image : inputs) {
-    const Channel* from = image.find(channel.name);
-    if (!from && channel.name == "ZBack") from = image.find("Z");
+  for (const DeepImage* image : inputs) {
+    const Channel* from = image->find(channel.name);
+    if (!from && channel.name == "ZBack") from = image->find("Z");
     values.push_back(from ? from->values.data() : nullptr);
     ids.push_back(from ? from->ids.data() : nullptr);
   }
@@ -122,28 +123,44 @@ void takeRow(std::span<const DeepImage> inputs, std::span<const Origin> origins,
     take<float>(origins, values, channel.values.data() + at);
 }
 
-DeepImage emptyResult(std::span<const DeepImage> inputs) {
-  DeepImage result{inputs[0].dataWindow, inputs[0].displayWindow, {}, {}, inputs[0].attributes};
-  for (const DeepImage& image : inputs) {
-    image.get("A");
-    result.dataWindow = unionOf(result.dataWindow, image.dataWindow);
-    result.displayWindow = unionOf(result.displayWindow, image.displayWindow);
+DeepImage emptyResult(Images inputs) {
+  DeepImage result{inputs[0]->dataWindow, inputs[0]->displayWindow, {}, {}, inputs[0]->attributes};
+  for (const DeepImage* image : inputs) {
+    image->get("A");
+    result.dataWindow = unionOf(result.dataWindow, image->dataWindow);
+    result.displayWindow = unionOf(result.displayWindow, image->displayWindow);
   }
   for (const char* name : {"fathom:spp", "deepImageState"}) result.attributes.erase(name);
   result.offsets = Buffer<uint64_t>(result.dataWindow.area() + 1, 0);
   return result;
 }
 
+std::vector<const DeepImage*> pointersTo(std::span<const DeepImage> images) {
+  std::vector<const DeepImage*> pointers;
+  for (const DeepImage& image : images) pointers.push_back(&image);
+  return pointers;
+}
+
+void checkStop(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Cancelled();
+}
+
 }  // namespace
 
 DeepImage merge(std::span<const DeepImage> images) {
+  return merge(pointersTo(images));
+}
+
+DeepImage merge(Images images, const std::stop_token& stop) {
   if (images.empty()) fail("merge: expected at least one image, found none");
   DeepImage result = emptyResult(images);
-  const std::vector<Input> inputs(images.begin(), images.end());
+  std::vector<Input> inputs;
+  for (const DeepImage* image : images) inputs.emplace_back(*image);
   const Box& window = result.dataWindow;
   const size_t width = size_t(window.width());
   std::vector<std::vector<Origin>> rows(size_t(window.height()));
   parallelFor(0, window.height(), [&](int row) {
+    checkStop(stop);
     std::vector<Placed> placed, scratch;
     for (size_t x = 0; x < width; ++x) {
       placePixel(inputs, window.x0 + int(x), window.y0 + row, placed, scratch);
@@ -154,6 +171,7 @@ DeepImage merge(std::span<const DeepImage> images) {
   for (size_t i = 0; i < window.area(); ++i) result.offsets[i + 1] += result.offsets[i];
   for (const NamedType& channel : channelsOf(images)) result.add(channel.name, channel.type);
   parallelFor(0, window.height(), [&](int row) {
+    checkStop(stop);
     for (Channel& channel : result.channels)
       takeRow(images, rows[size_t(row)], channel, size_t(result.offsets[size_t(row) * width]));
   });
@@ -176,14 +194,15 @@ std::string listOf(const std::set<std::string>& names) {
 
 }  // namespace
 
-std::vector<std::string> describeMerge(std::span<const DeepImage> inputs) {
+std::vector<std::string> describeMerge(std::span<const DeepImage> images) {
+  const std::vector<const DeepImage*> inputs = pointersTo(images);
   std::set<std::string> names;
-  for (const DeepImage& image : inputs)
+  for (const DeepImage& image : images)
     for (const Channel& channel : image.channels) names.insert(channel.name);
   std::set<std::string> filled, left;
   for (const std::string& name : names) {
     if (everyInputHas(inputs, name) || name == "ZBack") continue;
-    const auto has = std::ranges::find_if(inputs, [&](const DeepImage& image) { return image.find(name); });
+    const auto has = std::ranges::find_if(images, [&](const DeepImage& image) { return image.find(name); });
     (staysAlone(*has->find(name)) ? filled : left).insert(layerOf(name));
   }
   std::vector<std::string> lines;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ namespace fathom::deep {
 // would say nothing of the other's samples. Attributes are the first input's, without fathom:spp and deepImageState,
 // which do not describe the whole. Throws Error, too, where an input has no A or no Z.
 DeepImage merge(std::span<const DeepImage> inputs);
+// The same of images that lie apart. Throws Cancelled between rows.
+DeepImage merge(std::span<const DeepImage* const> inputs, const std::stop_token& stop = {});
 
 // The channels that `merge` fills up with 0, and those that it leaves out, by layer; a line each for the user.
 std::vector<std::string> describeMerge(std::span<const DeepImage> inputs);

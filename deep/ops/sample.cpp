@@ -5,6 +5,7 @@
 
 #include "deep/channels.h"
 #include "deep/pixel_pieces.h"
+#include "deep/sample_depths.h"
 #include "flat/error.h"
 
 namespace fathom::deep {
@@ -23,10 +24,10 @@ size_t pixelAt(const Box& window, int x, int y) {
 std::vector<SampleLight> lightOf(const DeepImage& image, int x, int y) {
   const Box& window = image.dataWindow;
   const size_t pixel = pixelAt(window, x, y), first = size_t(image.offsets[pixel]), count = image.count(pixel);
-  const std::span<const float> zBack = image.tryGet("ZBack");
+  const SampleDepths depths(image);
   const bool mergePoints = !holdsStatistics(image);
   PixelPieces pieces;
-  pieces.set(image.get("Z").subspan(first, count), zBack.empty() ? zBack : zBack.subspan(first, count));
+  pieces.set(depths.fronts(first, count), depths.backs(first, count));
   pieces.checkOverlaps(mergePoints, window, pixel);
   std::vector<SampleLight> light(count);
   std::vector<bool> begun(count);
@@ -47,10 +48,11 @@ std::vector<SampleLight> lightOf(const DeepImage& image, int x, int y) {
 // sample, what all depths from there on have in front of them.
 std::vector<double> passingTo(const DeepImage& image, int x, int y, std::span<const float> depths) {
   const size_t pixel = pixelAt(image.dataWindow, x, y);
-  const std::span<const float> alpha = image.get("A"), z = image.get("Z"), zBack = image.tryGet("ZBack");
+  const std::span<const float> alpha = image.get("A");
+  const SampleDepths ranges(image);
   std::vector<double> passing(depths.size(), 0), behind(depths.size() + 1, 0);  // optical depths at first
   for (size_t i = image.offsets[pixel]; i < image.offsets[pixel + 1]; ++i) {
-    const Range range = usableRange(z[i], zBack.empty() ? z[i] : zBack[i]);
+    const Range range = ranges[i];
     const double depth = opticalDepth(opacity(alpha[i])), length = double(range.zBack) - double(range.z);
     const size_t begin = size_t(std::ranges::upper_bound(depths, range.z) - depths.begin());
     const size_t end = std::max(begin, size_t(std::ranges::lower_bound(depths, range.zBack) - depths.begin()));

@@ -55,6 +55,11 @@ Resampling Transform::resampling(const Box& window) const {
           .tolerance = tolerance};
 }
 
+bool Transform::movesWholePixels() const {
+  const Resampling pixels = resampling({});
+  return pixels.columns.isWholeMove() && pixels.rows.isWholeMove();
+}
+
 void Transform::check() const {
   for (const double value : {x, y, z})
     if (!std::isfinite(value)) fail("transform: expected finite numbers, found {}", value);

@@ -14,6 +14,7 @@ struct Transform {
 
   // How the pixels of an image move; empty of effect where they do not.
   Resampling resampling(const Box& displayWindow) const;
+  bool movesWholePixels() const;
   // Throws Error where a number is not finite, a scale is not positive or beyond 1000, or the tolerance is negative.
   void check() const;
 };

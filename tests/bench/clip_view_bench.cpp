@@ -7,6 +7,7 @@
 #include "deep/clip.h"
 #include "deep/depth_histogram.h"
 #include "deep/flatten.h"
+#include "gui/compositor.h"
 #include "tests/bench/measure.h"
 #include "tests/bench/thicket.h"
 
@@ -15,8 +16,10 @@ namespace {
 
 constexpr int kWidth = 1920, kHeight = 1080, kRepeats = 9;
 
-Table measure() {
-  const deep::DeepImage image = thicket(kWidth, kHeight, 1);
+// What the viewer is to be done within, from compositing to coloured pixels, on two cores.
+constexpr double kHalfBar = 33, kFullBar = 150;  // ms
+
+Table measureCompositing(const deep::DeepImage& image) {
   const float infinity = std::numeric_limits<float>::infinity();
   struct Case {
     std::string name;
@@ -48,13 +51,61 @@ Table measure() {
   return table;
 }
 
+// A plane that moves on with every picture, as it is dragged.
+Table measureDragging(const gui::PicturePtr& picture) {
+  struct Case {
+    std::string name;
+    deep::DepthRange range;
+    std::string layer = "RGBA";
+  };
+  const float infinity = std::numeric_limits<float>::infinity();
+  const std::vector<Case> cases = {
+      {"near plane, colours", {3, infinity}},
+      {"both planes, colours", {3, 3.5f}},
+      {"both planes, soft, colours", {3, 3.5f, 0.1f}},
+      {"both planes, inverted, colours", {3, 3.5f, 0, true}},
+      {"near plane, depth", {3, infinity}, "Z"},
+      {"near plane, samples per pixel", {3, infinity}, "samples per pixel"},
+  };
+  gui::Compositor compositor(std::make_shared<gui::Display>());
+  gui::RenderRequest request{picture, nullptr, {}, picture->dataWindow()};
+  float moved = 0;
+  std::vector<std::function<void()>> runs;
+  for (const Case& one : cases)
+    for (const int step : {2, 1})
+      runs.emplace_back([&, step] {
+        request.state.layer = one.layer;
+        request.state.clip = one.range;
+        request.state.clip.near += (moved += 1e-5f);
+        compositor.make(request, step);
+      });
+  gui::Compositor colouring(std::make_shared<gui::Display>());  // keeps its planes
+  gui::RenderRequest brighter = request;
+  for (const int step : {2, 1})
+    runs.emplace_back([&, step] {
+      brighter.state.display.exposure = (moved += 1e-5f);
+      colouring.make(brighter, step);
+    });
+  const std::vector<double> seconds = interleavedMedians(runs, kRepeats);
+  Table table(fmt::format("A plane dragged in fathom-view, composited and coloured, {} x {}, {} threads", kWidth,
+                          kHeight, tbb::this_task_arena::max_concurrency()),
+              {"what is dragged", "half resolution ms", "bar ms", "full ms", "full bar ms"});
+  const auto add = [&](const std::string& name, size_t i) {
+    table.add({name, 1000 * seconds[2 * i], kHalfBar, 1000 * seconds[2 * i + 1], kFullBar});
+  };
+  for (size_t i = 0; i < cases.size(); ++i) add(cases[i].name, i);
+  add("exposure: colouring alone", cases.size());
+  return table;
+}
+
 }  // namespace
 }  // namespace fathom::bench
 
 int main(int argc, char** argv) {
   if (argc != 3) return fmt::print(stderr, "usage: bench_clip_view DEMO_FOLDER OUTPUT_FOLDER\n"), 2;
   using namespace fathom::bench;
-  const std::vector<Table> tables = {measure()};
+  const fathom::gui::PicturePtr picture = fathom::gui::makePicture("thicket", thicket(kWidth, kHeight, 1));
+  const std::vector<Table> tables = {measureCompositing(*picture->deep()), measureDragging(picture)};
   for (const Table& table : tables) table.print();
   writeJson(std::string(argv[2]) + "/clip_view.json", tables);
 }

@@ -6,7 +6,6 @@
 #include <QTest>
 #include <QWheelEvent>
 
-#include "gui/info_bar.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::gui {
@@ -312,20 +311,6 @@ TEST_F(CanvasTest, WithoutPicturesNothingIsShown) {
   EXPECT_TRUE(canvas.isCurrent());
   EXPECT_TRUE(canvas.shown().a.isNull());
   canvas.grab();
-}
-
-TEST(InfoBar, TellsThePixel) {
-  Session session;
-  const InfoBar bar(session);
-  EXPECT_EQ(bar.text(), "");
-  session.setA(makePicture());
-  session.setCursor(QPoint(5, 3));
-  const QString text = bar.text();
-  EXPECT_TRUE(text.startsWith("5, 3")) << text.toStdString();
-  EXPECT_TRUE(text.contains("R 0.5   G 0   B 0.0625   A 1")) << text.toStdString();
-  EXPECT_TRUE(text.contains("2 samples")) << text.toStdString();
-  session.setCursor(QPoint(500, 3));
-  EXPECT_TRUE(bar.text().contains("outside")) << bar.text().toStdString();
 }
 
 }  // namespace

@@ -76,6 +76,71 @@ TEST(Display, RowsOfAnyLengthAndOrderOfChannels) {
   }
 }
 
+DisplayParams paramsOf(const std::string& display, const std::string& view, float gamma = 1) {
+  DisplayParams params;
+  params.display = display;
+  params.view = view;
+  params.gamma = gamma;
+  return params;
+}
+
+// Bytes of values that climb through all that a screen shows, and of extremes.
+void expectSameRows(const Display& display, const DisplayParams& params) {
+  std::vector<float> values = {0, -0.0f, 1e-30f, -1e-6f, -0.1f, -65504, 65504, 1};
+  for (float value = 1e-7f; value < 20; value *= 1.0003f) values.push_back(value);
+  const std::vector<float> reversed(values.rbegin(), values.rend());
+  const std::array<const float*, 3> rgb{values.data(), reversed.data(), values.data()};
+  std::vector<QRgb> quick(values.size()), exact(values.size());
+  display.transform(params)(rgb, int(values.size()), quick.data());
+  display.transform(params, true)(rgb, int(values.size()), exact.data());
+  size_t others = 0;
+  for (size_t i = 0; i < values.size(); ++i) {
+    ASSERT_NEAR(qRed(quick[i]), qRed(exact[i]), 1) << values[i];
+    ASSERT_NEAR(qGreen(quick[i]), qGreen(exact[i]), 1) << reversed[i];
+    ASSERT_EQ(qAlpha(quick[i]), 255);
+    others += quick[i] != exact[i];
+  }
+  EXPECT_LT(others, values.size() / 50) << params.display << ", " << params.view << ", " << params.gamma;
+}
+
+TEST(Display, TheTableShowsWhatOpenColorIoDoes) {
+  const Display display;
+  for (const std::string& name : display.displays())
+    for (const std::string& view : display.views(name))
+      for (const float gamma : {0.5f, 1.0f, 2.2f}) expectSameRows(display, paramsOf(name, view, gamma));
+}
+
+TEST(Display, WhatNoTableHoldsIsStillRight) {
+  QTemporaryDir folder;
+  const QString path = folder.filePath("mixing.ocio");
+  QFile file(path);
+  ASSERT_TRUE(file.open(QIODevice::WriteOnly));
+  // The first view mixes channels, the second one is too steep near 0.
+  file.write(R"(ocio_profile_version: 2
+roles: {default: linear, scene_linear: linear}
+displays:
+  screen:
+    - !<View> {name: mixing, colorspace: mixed}
+    - !<View> {name: steep, colorspace: steep}
+colorspaces:
+  - !<ColorSpace> {name: linear}
+  - !<ColorSpace>
+    name: mixed
+    from_scene_reference: !<MatrixTransform> {matrix: [0.5, 0.5, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
+  - !<ColorSpace>
+    name: steep
+    from_scene_reference: !<ExponentTransform> {value: [0.02, 0.02, 0.02, 1]}
+)");
+  file.close();
+  const Display display(path.toStdString());
+  expectSameRows(display, paramsOf("", "mixing"));
+  expectSameRows(display, paramsOf("", "steep"));
+  const float red = 1, none = 0;
+  QRgb pixel;
+  display.transform(paramsOf("", "mixing"))({&red, &none, &none}, 1, &pixel);
+  EXPECT_EQ(qRed(pixel), 128);
+}
+
 TEST(Display, AConfigThatCannotBeUsedIsNamedAndReplaced) {
   EXPECT_THROW(Display("/nothing/config.ocio"), Error);
   QTemporaryDir folder;

@@ -158,43 +158,6 @@ TEST_F(PanelsTest, AVolumeIsPlacedMovedAndRemoved) {
   EXPECT_FALSE(placement.active());
 }
 
-TEST_F(PanelsTest, WhileItMovesThereIsADraftWithTheChannelsThatAreSeen) {
-  open("noisy.exr");
-  std::vector<size_t> seen;
-  Placement placement(session_, frames_);
-  placement.open(path("other.exr"));
-  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
-  const size_t all = session_.a()->deep()->channels.size();
-  QObject::connect(&session_, &Session::picturesChanged,
-                   [&] { seen.push_back(session_.a()->deep()->channels.size()); });
-  placement.setTransform({.z = 1});
-  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
-  EXPECT_THAT(seen, ::testing::ElementsAre(5, all));  // R G B A Z
-  EXPECT_GT(all, 5u);
-}
-
-// The inspector shows colours whatever layer is seen, and another layer may be chosen while there is a draft.
-TEST_F(PanelsTest, TheInspectorShowsADraftOfAnyLayer) {
-  open("noisy.exr");
-  const auto seeLayer = [this](const std::string& name) {
-    ViewState view = session_.view();
-    view.layer = name;
-    session_.setView(view);
-  };
-  seeLayer("Z");
-  session_.setPin(QPoint(10, 10));
-  InspectorPanel inspector(session_);
-  inspector.show();
-  Placement placement(session_, frames_);
-  placement.open(path("other.exr"));
-  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
-  QObject::connect(
-      &session_, &Session::picturesChanged, &inspector, [&] { seeLayer("diffuse"); }, Qt::SingleShotConnection);
-  placement.setTransform({.z = 1});
-  ASSERT_TRUE(waitFor([&] { return !placement.busy(); }));
-  EXPECT_EQ(session_.view().layer, "diffuse");
-}
-
 TEST_F(PanelsTest, WithoutAnAThereIsNothingToPlaceIn) {
   Placement placement(session_, frames_);
   placement.open(path("other.exr"));

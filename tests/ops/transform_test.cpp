@@ -11,7 +11,9 @@
 #include "deep/ops/crop.h"
 #include "deep/ops/insert.h"
 #include "deep/ops/merge.h"
+#include "deep/pick.h"
 #include "flat/error.h"
+#include "flat/progress.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {
@@ -118,11 +120,37 @@ TEST(Insert, IsTheMergeWithTheMovedImage) {
     both.push_back(frame.copy());
     both.push_back(transform(smoke.copy(), placement));
     both[1].displayWindow = frame.displayWindow;
-    const DeepImage inserted = insert(frame.copy(), smoke.copy(), placement);
+    const DeepImage inserted = insert(frame, smoke.copy(), placement);
     EXPECT_EQ(reference::difference(inserted, merge(both)), "") << "seed " << seed;
     EXPECT_EQ(inserted.displayWindow, frame.displayWindow);
     EXPECT_EQ(inserted.samples(), both[0].samples() + both[1].samples());
   }
+}
+
+// Of any pixels, with points and volumes, ids and statistics.
+TEST(Insert, APartIsThatOfTheWhole) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const DeepImage frame = randomSamples({.seed = seed, .volumes = seed % 2 == 0});
+    const DeepImage smoke = randomSamples({.window = {4, 4, 20, 14}, .seed = 100 + seed, .volumes = true});
+    const Transform placement{.x = double(seed) - 4, .y = 2, .z = 1.5, .zScale = 0.5};
+    const DeepImage whole = insert(frame, smoke.copy(), placement);
+    for (const int step : {1, 2, 5}) {
+      const Box box{whole.dataWindow.x0 - 3, whole.dataWindow.y0 + 1, whole.dataWindow.x1 + 2, whole.dataWindow.y1 + 4};
+      std::vector<std::string> names;
+      for (const Channel& channel : whole.channels) names.push_back(channel.name);
+      DeepImage expected = pick(whole, box, step, names), part = insertPart(frame, smoke, placement, box, step, names);
+      EXPECT_EQ(part.dataWindow, expected.dataWindow);
+      EXPECT_EQ(reference::difference(part, expected), "") << "seed " << seed << ", step " << step;
+    }
+  }
+  EXPECT_THROW(insertPart(randomSamples({.seed = 1}), randomSamples({.seed = 2}), {.x = 0.5}, {0, 0, 4, 4}, 1, {}),
+               Error);
+}
+
+TEST(Insert, StopsWhenItIsTold) {
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(insert(randomSamples({.seed = 1}), randomSamples({.seed = 2}), {}, stop.get_token()), Cancelled);
 }
 
 TEST(Insert, FarBehindChangesNothingThatIsOpaque) {
@@ -130,7 +158,7 @@ TEST(Insert, FarBehindChangesNothingThatIsOpaque) {
   std::fill(frame.get("A").begin(), frame.get("A").end(), 1.0f);
   const flat::Image before = flatten(frame);
   const DeepImage smoke = randomSamples({.seed = 3, .volumes = true});
-  const flat::Image after = flatten(insert(frame.copy(), smoke.copy(), {.z = 1000}));
+  const flat::Image after = flatten(insert(frame, smoke.copy(), {.z = 1000}));
   for (size_t p = 0; p < frame.pixels(); ++p)
     if (frame.count(p) > 0) {
       EXPECT_EQ(after.get("R").values[p], before.get("R").values[p]);

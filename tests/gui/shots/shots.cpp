@@ -52,6 +52,7 @@ class Shots {
     window.show();
     window.frames().open(QString::fromStdString(a));
     if (!b.empty()) window.frames().openB(QString::fromStdString(b));
+    for (int i = 0; i < 100 && !(window.session().a() && (b.empty() || window.session().b())); ++i) spin(100);
     settled(window);
     prepare(window);
     const std::string path = fmt::format("{}/{}.png", folder_, name);
@@ -107,7 +108,7 @@ int run(const std::string& folder, const std::string& only) {
     expose(-1)(window);
     window.session().setBox(Box{80, 40, 120, 60});
     window.findChild<InspectorPanel*>()->showTab(InspectorPanel::Tab::Box);
-    window.findChild<Canvas*>()->zoomTo(64);
+    window.findChild<Canvas*>()->zoomTo(64 * window.devicePixelRatioF());
   });
   shots.take("placed", demo("sequence.0001.deep.exr"), "", [&](MainWindow& window) {
     expose(-1)(window);
