@@ -27,6 +27,7 @@ struct CompareParams {
   std::string image, reference;
   std::string frames;              // empty: those on disk
   bool correct = false;            // subtract the reference's own error
+  std::string noisy;               // the frame with the noise that the reference has less of; empty: none
   std::vector<std::string> clips;  // depths, or "median"
   bool asJson = false;
   std::string heatmap;  // empty: none
@@ -71,12 +72,13 @@ class Comparison {
  public:
   explicit Comparison(const CompareParams& params) : params_(params) {}
 
-  ordered_json compareFrame(const std::string& path, const std::string& referencePath) {
+  ordered_json compareFrame(const std::string& path, const std::string& referencePath, const std::string& noisyPath) {
     AnyImage image = loadImage(path, isCompared), reference = loadImage(referencePath, isCompared);
     ordered_json result;
     FlatPair pair;
     try {
       if (image.index() == 0 && reference.index() == 0) {
+        addOwnVariance(noisyPath, std::get<deep::DeepImage>(reference));
         result = compareDeep(tidied(std::move(image)), tidied(std::move(reference)), pair);
       } else {
         if (!params_.clips.empty()) fail("--clip: expected two deep images, found a flat one");
@@ -105,6 +107,14 @@ class Comparison {
  private:
   flat::MetricParams metricParams() const { return {.correct = params_.correct}; }
 
+  // Of a deep reference without variances, from the noisy frame where that is named.
+  void addOwnVariance(const std::string& noisyPath, deep::DeepImage& reference) const {
+    if (noisyPath.empty() || reference.find("variance.R")) return;
+    const AnyImage noisy = loadImage(noisyPath, isCompared);
+    if (noisy.index() != 0) fail("--noisy: expected a deep image, found the flat {}", noisyPath);
+    deep::addOwnVariance(std::get<deep::DeepImage>(noisy), reference);
+  }
+
   ordered_json compareDeep(const deep::DeepImage& image, const deep::DeepImage& reference, FlatPair& pair) {
     if (!clips_) clips_ = clipDepths(params_, reference);
     pair = {deep::visiblePart(image), deep::visiblePart(reference)};
@@ -122,6 +132,7 @@ void runCompare(const CompareParams& params) {
   if (!sequence.missing.empty())
     fail("{}: expected every frame, found none for {}", sequence.pattern.text(), describeFrames(sequence.missing));
   const FilePattern reference = parsePattern(params.reference), heatmap = parsePattern(params.heatmap);
+  const FilePattern noisy = parsePattern(params.noisy);
   if (sequence.frames.size() > 1 && !params.heatmap.empty() && !heatmap.numbered())
     fail("--heatmap: expected a numbered name for a sequence, found {}", params.heatmap);
   Comparison comparison(params);
@@ -129,7 +140,7 @@ void runCompare(const CompareParams& params) {
   ordered_json report = {{"corrected", params.correct}, {"frames", ordered_json::array()}};
   for (const int frame : sequence.frames) {
     const std::string path = sequence.pattern.at(frame), referencePath = reference.at(frame);
-    frames.push_back(comparison.compareFrame(path, referencePath));
+    frames.push_back(comparison.compareFrame(path, referencePath, params.noisy.empty() ? "" : noisy.at(frame)));
     report["frames"].push_back({{"image", path}, {"reference", referencePath}});
     report["frames"].back().update(frames.back());
     if (!params.heatmap.empty()) {
@@ -162,6 +173,9 @@ void addCompare(CLI::App& app) {
   command->add_option("reference", params->reference, "Its reference: flat, or deep with the same bins")->required();
   command->add_option("--frames", params->frames, "Frames of the sequence, such as 1-100x2 (default: those on disk)");
   command->add_flag("--correct", params->correct, "Subtract the reference's own error, from its variance channels");
+  command->add_option("--noisy", params->noisy,
+                      "The noisy frame: with --correct, its variances and the sample counts of both tell a deep "
+                      "reference's own error");
   command
       ->add_option(
           "--clip", params->clips,

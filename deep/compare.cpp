@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "deep/alpha.h"
 #include "deep/sample_depths.h"
@@ -174,6 +175,19 @@ flat::Image visiblePart(const DeepImage& image, float near, float far) {
     }
   });
   return result;
+}
+
+void addOwnVariance(const DeepImage& noisy, DeepImage& reference) {
+  checkSameBins(noisy, reference);
+  const auto counts = noisy.get("samples"), referenceCounts = std::as_const(reference).get("samples");
+  Buffer<float> ratio(reference.samples());
+  for (size_t i = 0; i < ratio.size(); ++i) ratio[i] = referenceCounts[i] > 0 ? counts[i] / referenceCounts[i] : 0;
+  for (const char* colour : kColours) {
+    const std::string name = std::string("variance.") + colour;
+    const auto variance = noisy.get(name);
+    Buffer<float>& own = reference.add(name, PixelType::Float).values;
+    for (size_t i = 0; i < own.size(); ++i) own[i] = float(finiteVariance(variance[i]) * double(ratio[i]));
+  }
 }
 
 DeepMetrics compare(const DeepImage& image, const DeepImage& reference, const DeepMetricParams& params) {

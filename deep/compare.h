@@ -49,6 +49,11 @@ float medianDepth(const DeepImage& image);
 flat::Image visiblePart(const DeepImage& image, float near = -std::numeric_limits<float>::infinity(),
                         float far = std::numeric_limits<float>::infinity());
 
+// Gives a deep reference without variances those that its camera samples make likely: a bin's noise is that of the same
+// bin of `noisy` (which has variance.{R,G,B} and `samples`) with as many samples as the reference's `samples` counts.
+// Bins must agree as for `compare`, and both have `samples`; else an Error says what is missing.
+void addOwnVariance(const DeepImage& noisy, DeepImage& reference);
+
 // Both images tidy, with the same windows and the same number of samples in each pixel, else an Error says where they
 // differ.
 DeepMetrics compare(const DeepImage& image, const DeepImage& reference, const DeepMetricParams& params = {});

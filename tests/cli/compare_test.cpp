@@ -54,6 +54,17 @@ TEST(CompareCommand, CorrectingSubtractsTheReferencesOwnError) {
   EXPECT_NEAR(corrected["relMSE"].get<double>(), plain["relMSE"].get<double>() - own, 1e-9);
 }
 
+// A deep reference has no variances: the noisy frame's, and how many samples each bin of both has, stand for them.
+TEST(CompareCommand, TheNoisyFrameTellsADeepReferencesOwnError) {
+  const json plain = jsonOf(kDeep + " " + kDeepReference + " --clip median")["mean"];
+  const json corrected = jsonOf(kDeep + " " + kDeepReference + " --clip median --correct --noisy " + kDeep)["mean"];
+  const double noisy = plain["bins"]["relMSE"], without = corrected["bins"]["relMSE"];
+  // 32 samples against 512: the reference has about a sixteenth of the noise, and the frame the rest.
+  EXPECT_NEAR((noisy - without) / without, 1.0 / 16, 0.02);
+  EXPECT_LT(corrected["clips"][0]["front"]["relMSE"].get<double>(), plain["clips"][0]["front"]["relMSE"].get<double>());
+  EXPECT_EQ(runFathom("compare " + kDeep + " " + kDeepReference + " --correct --noisy " + kReference).status, 1);
+}
+
 TEST(CompareCommand, ATableForPeople) {
   const Ran ran = runFathom("compare " + kDeep + " " + kDeepReference + " --clip median,3");
   EXPECT_EQ(ran.status, 0);
