@@ -131,8 +131,8 @@ void addDenoise(CLI::App& app) {
          "Denoise, which also helps with the bins, or in a file; auto takes what promises the least error")
       ->default_str(command->request.guide);
   sub->add_flag("--error", command->request.errors,
-                "Also write the estimated squared errors of the colours as error.{R,G,B} (flat frames; three times the "
-                "work)");
+                "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "
+                "flattened ones (three times the work)");
   sub->add_flag("--no-gate", command->noGate, "The published filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")

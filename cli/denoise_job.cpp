@@ -170,7 +170,6 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
   plan.errors = request.errors;
   if (!plan.deep && !request.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
-  if (plan.deep && request.errors) fail("{}: expected a flat file for --error, found a deep one", request.input);
   if (request.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
   if (plan.deep)

@@ -22,7 +22,7 @@ struct DenoiseRequest {
   deep::DenoiseParams params;
   BaseOptions base;
   bool components = false;
-  bool errors = false;  // error.{R,G,B} beside the colours; of flat frames
+  bool errors = false;  // error.{R,G,B} beside the colours
   bool overwrite = false;
   size_t memory = size_t(8) << 30;
 };

@@ -10,6 +10,7 @@
 #include "deep/alpha.h"
 #include "deep/apply_flat.h"
 #include "deep/channels.h"
+#include "deep/error_estimate.h"
 #include "deep/flat_nl_means.h"
 #include "flat/error.h"
 
@@ -105,6 +106,19 @@ deep::DeepImage denoiseFlat(deep::DeepImage image, const SequencePlan& plan, con
   return image;
 }
 
+// A deep frame or a band of it; `guide`: of the whole frame, where one was made.
+deep::DeepImage denoiseDeep(deep::DeepImage image, const FrameInputs& inputs, const SequencePlan& plan,
+                            const deep::BaseGuide* guide, const Progress& progress, deep::DenoiseStats* stats) {
+  if (!plan.guide) return deep::denoise(std::move(image), plan.denoise, progress, stats);
+  const Stopwatch watch;
+  const Progress first{[&](double done) { progress.at(kGuidePart * done); }, progress.stop};
+  const deep::BaseGuide rows = guide ? deep::guideRows(*guide, image.dataWindow.y0, image.dataWindow.y1)
+                                     : guideOf(image, *plan.guide, inputs, plan.denoise, first);
+  if (stats) stats->seconds["guide"] += watch.seconds();
+  const Progress rest{[&](double done) { progress.at(kGuidePart + (1 - kGuidePart) * done); }, progress.stop};
+  return deep::denoise(std::move(image), plan.denoise, rest, stats, &rows);
+}
+
 }  // namespace
 
 size_t decodedLimit(size_t memory) {
@@ -145,14 +159,21 @@ FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, c
 deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& inputs, const SequencePlan& plan,
                                  const deep::BaseGuide* guide, const Progress& progress, deep::DenoiseStats* stats) {
   if (!plan.deep) return denoiseFlat(std::move(image), plan, progress, stats);
-  if (!plan.guide) return deep::denoise(std::move(image), plan.denoise, progress, stats);
+  if (!plan.errors) return denoiseDeep(std::move(image), inputs, plan, guide, progress, stats);
+  // The first run is a third of the work, two probes are the rest.
+  const deep::DeepImage noisy = image.copy();
+  const Progress first{[&](double done) { progress.at(done / 3); }, progress.stop};
+  image = denoiseDeep(std::move(image), inputs, plan, guide, first, stats);
   const Stopwatch watch;
-  const Progress first{[&](double done) { progress.at(kGuidePart * done); }, progress.stop};
-  const deep::BaseGuide rows = guide ? deep::guideRows(*guide, image.dataWindow.y0, image.dataWindow.y1)
-                                     : guideOf(image, *plan.guide, inputs, plan.denoise, first);
-  if (stats) stats->seconds["guide"] += watch.seconds();
-  const Progress rest{[&](double done) { progress.at(kGuidePart + (1 - kGuidePart) * done); }, progress.stop};
-  return deep::denoise(std::move(image), plan.denoise, rest, stats, &rows);
+  const Progress rest{[&](double done) { progress.at((1 + 2 * done) / 3); }, progress.stop};
+  deep::addFlattenedErrors(
+      noisy, plan.denoise.inputs,
+      [&](deep::DeepImage moved, const Progress& part) {
+        return denoiseDeep(std::move(moved), inputs, plan, nullptr, part, nullptr);
+      },
+      {}, rest, image);
+  if (stats) stats->seconds["error"] += watch.seconds();
+  return image;
 }
 
 std::string describePlan(const SequencePlan& plan) {

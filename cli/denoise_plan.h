@@ -26,7 +26,7 @@ struct SequencePlan {
   // Denoises the frames, which are flat, instead of `denoise`; none: nothing does. It needs whole frames.
   std::optional<BaseDenoiser> base;
   std::optional<GuidePlan> guide;  // of deep frames
-  bool errors = false;             // of flat frames: error.{R,G,B} beside the colours; it needs whole frames
+  bool errors = false;             // error.{R,G,B} beside the colours; it needs whole frames
   std::set<std::string> notes;     // lines for the user
   // The main file that this was decided from; and where it is wanted and fits the memory, the image as it is denoised.
   std::string first;

@@ -3,60 +3,27 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <string>
 #include <vector>
 
+#include "deep/denoise.h"
+#include "deep/error_estimate.h"
 #include "deep/flat_nl_means.h"
+#include "deep/flatten.h"
+#include "deep/io.h"
 #include "flat/error_summary.h"
 #include "flat/io.h"
 #include "flat/metrics.h"
 #include "flat/progressive.h"
+#include "tests/reference/pixel_map.h"
 
 namespace fathom::flat {
 namespace {
 
-// Sums over R, G and B per pixel.
-using PixelMap = std::vector<double>;
-
-PixelMap boxMean(const PixelMap& in, int width, int height) {
-  PixelMap result(in.size());
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      double sum = 0;
-      int count = 0;
-      for (int yq = std::max(0, y - 5); yq <= std::min(height - 1, y + 5); ++yq)
-        for (int xq = std::max(0, x - 5); xq <= std::min(width - 1, x + 5); ++xq, ++count)
-          sum += in[size_t(yq * width + xq)];
-      result[size_t(y * width + x)] = sum / count;
-    }
-  return result;
-}
-
-PixelMap ranks(const PixelMap& values) {
-  std::vector<size_t> order(values.size());
-  std::iota(order.begin(), order.end(), size_t(0));
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return values[a] < values[b]; });
-  PixelMap result(values.size());
-  for (size_t i = 0; i < order.size(); ++i) result[order[i]] = double(i);
-  return result;
-}
-
-double spearman(const PixelMap& a, const PixelMap& b) {
-  const PixelMap x = ranks(a), y = ranks(b);
-  const double mean = double(x.size() - 1) / 2;
-  double xy = 0, xx = 0, yy = 0;
-  for (size_t i = 0; i < x.size(); ++i) {
-    xy += (x[i] - mean) * (y[i] - mean);
-    xx += (x[i] - mean) * (x[i] - mean);
-    yy += (y[i] - mean) * (y[i] - mean);
-  }
-  return xy / std::sqrt(xx * yy);
-}
-
-double sum(const PixelMap& map) {
-  return std::accumulate(map.begin(), map.end(), 0.0);
-}
+using reference::boxMean;
+using reference::PixelMap;  // sums over R, G and B
+using reference::spearman;
+using reference::sum;
 
 class SureAccuracy : public ::testing::TestWithParam<const char*> {
  protected:
@@ -117,6 +84,25 @@ TEST_P(SureAccuracy, TheMixIsNoWorseThanItsPartsAndKnowsItsError) {
 TEST_P(SureAccuracy, TheGateDoesNoHarm) {
   const Image denoised = denoiser(noisy, {});
   EXPECT_LT(relMse(gated(noisy, noise, denoised)), 1.01 * relMse(denoised));
+}
+
+// The same of deep frames, whose alphas are noisy, too.
+TEST_P(SureAccuracy, FollowsTheTruthOfDeepFrames) {
+  const deep::DeepImage bins = deep::read(render(".deep.exr"));
+  std::vector<std::string> names;
+  for (const deep::Channel& channel : bins.channels) names.push_back(channel.name);
+  const deep::DenoisePlan plan{deep::findDenoiseInputs(names, bins.attributes), {}, deep::meanLevel(bins)};
+  const auto denoise = [&](deep::DeepImage image, const Progress&) { return deep::denoise(std::move(image), plan); };
+  deep::DeepImage denoised = denoise(bins.copy(), {});
+  deep::addFlattenedErrors(bins, plan.inputs, denoise, {}, {}, denoised);
+  const Image result = deep::flatten(denoised);
+  PixelMap estimate(result.dataWindow.area(), 0.0);
+  for (const char* name : {"error.R", "error.G", "error.B"})
+    for (size_t i = 0; i < estimate.size(); ++i) estimate[i] += double(result.get(name).values[i]);
+  const PixelMap errors = truth(result);
+  EXPECT_NEAR(std::log(sum(estimate) / sum(errors)), 0, std::log(2.2));
+  const int width = result.dataWindow.width(), height = result.dataWindow.height();
+  EXPECT_GT(spearman(boxMean(estimate, width, height), boxMean(errors, width, height)), 0.6);
 }
 
 INSTANTIATE_TEST_SUITE_P(Renders, SureAccuracy,
