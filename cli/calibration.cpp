@@ -13,6 +13,7 @@ namespace fathom::cli {
 namespace {
 
 constexpr int kWidth = 256, kHeight = 128, kSpp = 32, kRuns = 3;
+constexpr float kSamples = kSpp / 2.0f;  // of each bin
 
 // Two surfaces behind one another in every pixel, with grain in all that the channel convention knows.
 deep::DeepImage calibrationFrame() {
@@ -27,8 +28,8 @@ deep::DeepImage calibrationFrame() {
   };
   fill("A", 0.5f, 1, 0);
   fill("Z", 2, 5, 0);
-  fill("samples", kSpp / 2, kSpp / 2, 0);
-  for (const std::string half : {"half0.", "half1."}) fill(half + "samples", kSpp / 4, kSpp / 4, 0);
+  fill("samples", kSamples, kSamples, 0);
+  for (const std::string half : {"half0.", "half1."}) fill(half + "samples", kSamples / 2, kSamples / 2, 0);
   for (const char* c : {"R", "G", "B"}) {
     for (const std::string prefix : {"", "half0.", "half1."}) {
       for (const std::string layer : {"", "diffuse.", "specular."}) fill(prefix + layer + c, 0.2f, 0.4f, 0.5f);

@@ -41,6 +41,10 @@ The method, and the brightness that constants scale with, are decided from the f
 whatever --frames says, so that a farm may split a sequence and the parts agree. Every output is written beside its place
 and renamed when complete; started again, a run does only what is missing.
 
+--time-budget takes the setting that outputs of the sequence record, where there are any with one; else it times a small
+frame of its own. Machines that start together on a sequence without outputs may choose differently: let one frame come
+first, or give the options that the first line names to all.
+
 Exit status: 0 all frames done, 1 some failed (one line each), 2 usage, 130 stopped.)";
 
 [[noreturn]] void usage(const std::string& option, const std::string& text) {

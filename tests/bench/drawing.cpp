@@ -41,9 +41,10 @@ void draw(flat::Image& image, const Line& line) {
 
 void draw(flat::Image& image, const Disc& disc) {
   const double radius = kScale * disc.radius;
-  for (double row = -radius; row < radius; ++row) {
-    const double half = std::sqrt(std::max(0.0, radius * radius - (row + 0.5) * (row + 0.5)));
-    const int y = int(std::lround(kScale * disc.y + row)), x = int(std::lround(kScale * disc.x - half));
+  const int top = int(std::lround(kScale * disc.y - radius)), rows = int(std::lround(2 * radius));
+  for (int row = 0; row < rows; ++row) {
+    const double above = row + 0.5 - radius, half = std::sqrt(std::max(0.0, radius * radius - above * above));
+    const int y = top + row, x = int(std::lround(kScale * disc.x - half));
     flat::fillBox(image, {x, y, x + int(std::lround(2 * half)), y + 1}, disc.colour);
   }
 }
