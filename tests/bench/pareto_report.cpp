@@ -31,6 +31,17 @@ double secondsOf(const ParetoResult& result, const cli::DenoiseSetting& setting)
   return found ? found->secondsPerMegapixel : 0;
 }
 
+// What Open Image Denoise adds to a deep frame, whatever the quality: the mean over the qualities.
+double networkOfDeep(const ParetoResult& result) {
+  double sum = 0, count = 0;
+  for (const Quality quality : {Quality::Fast, Quality::Balanced, Quality::Best})
+    if (const double guided = secondsOf(result, {quality, true, "oidn"}); guided > 0) {
+      sum += guided - secondsOf(result, {quality, true, "none"});
+      ++count;
+    }
+  return count > 0 ? std::max(0.0, sum / count) : 0;
+}
+
 struct Costs {
   double perMegapixel = 0, perMillionBins = 0, network = 0;
 };
@@ -43,8 +54,9 @@ Costs costsOf(const ParetoResult& result, const MethodResult& of) {
   const double more = std::max(0.01, result.binsPerPixel - 1);
   // Neither a pixel nor a bin costs less than nothing.
   const double perBin = std::clamp((alone - flat) / more, 0.0, alone / result.binsPerPixel);
-  const double network = with == "oidn" ? std::max(0.0, seconds - alone) : 0;
-  return {std::max(0.0, seconds - network - perBin * result.binsPerPixel), perBin, network};
+  const bool network = with == "oidn";
+  const double ours = (network ? alone : seconds) - perBin * result.binsPerPixel;
+  return {ours > 1e-6 ? ours : 0, perBin, network ? networkOfDeep(result) : 0};
 }
 
 const char* nameOf(Quality quality) {

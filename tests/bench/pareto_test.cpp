@@ -141,6 +141,13 @@ TEST(ParetoReport, CostsAreALineThroughFlatAndDeep) {
             "constexpr double kCalibration = 0.25;\n");
 }
 
+TEST(ParetoReport, TheNetworkCostsTheSameAtAnyQuality) {
+  ParetoResult result = madeUp();
+  for (const auto& [with, seconds] : {std::pair("none", 10.0), std::pair("oidn", 19.0)})
+    result.methods.push_back({{with, {Quality::Best, true, with}}, seconds, {}});
+  EXPECT_THAT(costRows(result), HasSubstr("{Quality::Fast, true, \"oidn\"}, 2, 3, 8,")) << "7 and 9";
+}
+
 TEST(ParetoReport, NoCostIsBelowZero) {
   ParetoResult result = madeUp();
   result.methods[2].secondsPerMegapixel = 1;  // a steeper line than through nothing
