@@ -60,7 +60,7 @@ std::vector<SettingCost> costsOf(bool deep, std::span<const std::string> with) {
 double expectedSeconds(const SettingCost& cost, const Workload& workload, double slowness) {
   const double filters = cost.perMegapixel + cost.perMillionBins * workload.binsPerPixel;
   const double perMegapixel = cost.network + filters * (workload.components ? 1 : kOneComponent);
-  return slowness * workload.megapixels * perMegapixel;
+  return slowness * workload.runs * workload.megapixels * perMegapixel;
 }
 
 BudgetChoice chooseSetting(std::span<const SettingCost> costs, const Workload& workload, double budget,

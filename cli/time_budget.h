@@ -17,6 +17,7 @@ struct Workload {
   double megapixels = 1;
   double binsPerPixel = 1;  // the mean over all pixels
   bool components = true;   // diffuse and specular are filtered one by one
+  int runs = 1;             // of the denoiser: an estimate of its errors takes further ones
 };
 
 // Seconds on the machine of the measurement, frames decoded and with all features.
