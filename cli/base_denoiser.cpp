@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "deep/flat_nl_means.h"
+#include "flat/error.h"
 #include "flat/oidn.h"
 
 namespace fathom::cli {
@@ -32,6 +33,14 @@ std::string describeFilter(const deep::DenoisePlan& plan) {
                           in.albedoVariance, in.normal, in.normalVariance, in.depthVariance, in.volumes})
     text += flag ? " 1" : " 0";
   return text;
+}
+
+std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path) {
+  try {
+    return flat::loadOidn(path);
+  } catch (const Error&) {
+    return nullptr;
+  }
 }
 
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <string>
 
 #include "deep/denoise.h"
@@ -9,6 +10,10 @@
 
 namespace CLI {
 class App;
+}
+
+namespace fathom::flat {
+struct OidnLibrary;
 }
 
 namespace fathom::cli {
@@ -32,6 +37,9 @@ struct BaseDenoiser {
 // Fast its fast network with the guides as they are, else its best one with guides denoised first. `scratch`: bytes that
 // oidn may use beside the images. Throws Error where its library is not found.
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch);
+
+// Open Image Denoise's library, or nothing where it is not found: see flat::loadOidn.
+std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path);
 
 // All of a plan that decides what our own filter makes, as text to be hashed.
 std::string describeFilter(const deep::DenoisePlan& plan);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "cli/commands.h"
@@ -22,6 +23,7 @@ struct DenoiseCommand {
   DenoiseRequest request;  // but for its params
   std::string frames, stats;
   std::string quality = "balanced";
+  double budget = 0;  // seconds; 0: none
   std::string missing = "fail";
   bool noGate = false;
   bool keep = false;
@@ -38,6 +40,10 @@ buffers, variances and counts describe the noisy colours and stay out of it unle
 The method, and the brightness that constants scale with, are decided from the first frame of the sequence on disk,
 whatever --frames says, so that a farm may split a sequence and the parts agree. Every output is written beside its place
 and renamed when complete; started again, a run does only what is missing.
+
+--time-budget takes the setting that outputs of the sequence record, where there are any with one; else it times a small
+frame of its own. Machines that start together on a sequence without outputs may choose differently: let one frame come
+first, or give the options that the first line names to all.
 
 Exit status: 0 all frames done, 1 some failed (one line each), 2 usage, 130 stopped.)";
 
@@ -99,6 +105,11 @@ void addDenoise(CLI::App& app) {
   const auto option = [&](const char* name, auto& value, const char* type, const std::string& text) {
     return sub->add_option(name, value, text)->type_name(type);
   };
+  const auto isTime = [](const std::string& text) {
+    double seconds = 0;
+    const bool number = CLI::detail::lexical_cast(text, seconds) && std::isfinite(seconds) && seconds > 0;
+    return number ? std::string() : fmt::format("expected seconds above 0, found {}", text);
+  };
   // What is not understood is a usage error.
   const auto understood = [](auto parse) {
     return CLI::Validator(
@@ -121,10 +132,15 @@ void addDenoise(CLI::App& app) {
   option("--flat", command->request.flattened, "OUT2", "Also write the flattened result");
   sub->add_flag("--components", command->request.components,
                 "Also write diffuse and specular each to a file beside OUT (which holds both as channels)");
-  option("--quality", command->quality, "fast|balanced|best",
-         "fast takes three quarters of the time of balanced, best two and a half times as much")
-      ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
-      ->default_str(command->quality);
+  CLI::Option* quality = option("--quality", command->quality, "fast|balanced|best",
+                                "fast takes three quarters of the time of balanced, best two and a half times as much")
+                             ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
+                             ->default_str(command->quality);
+  option("--time-budget", command->budget, "SECONDS",
+         "Choose the quality, and the guide or the base where none is named, for so much work on a frame, reading and "
+         "writing aside; once for a sequence, whose outputs record it")
+      ->check(CLI::Validator(isTime, ""))
+      ->excludes(quality);
   addBaseOptions(*sub, command->request.base);
   option("--flat-guide", command->request.guide, "auto|nlm|oidn|none|FILE",
          "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of Open Image "
@@ -157,7 +173,11 @@ void addDenoise(CLI::App& app) {
       ->default_str("8G");
   option("--stats", command->stats, "FILE", "Write times, counts and memory as JSON");
   sub->add_flag("--overwrite", command->request.overwrite, "Replace outputs that other settings or another input made");
-  sub->callback([command] { runDenoise(*command); });
+  sub->callback([command, sub] {
+    if (sub->count("--time-budget") > 0) command->request.timeBudget = command->budget;
+    command->request.anyBase = sub->count("--base") == 0;
+    runDenoise(*command);
+  });
 }
 
 }  // namespace fathom::cli

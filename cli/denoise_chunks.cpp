@@ -108,7 +108,8 @@ bool ChunkReader::open() {
     guide_ = std::make_shared<deep::BaseGuide>(
         readGuide(*source_, bands_.front().y1 - bands_.front().y0, *job_.plan.guide, frame.inputs, job_.plan.denoise));
   origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
-                                                      source_->part().dataWindow, source_->flatAttributes(), madeBy});
+                                                      source_->part().dataWindow, source_->flatAttributes(), madeBy,
+                                                      job_.plan.record});
   return true;
 }
 

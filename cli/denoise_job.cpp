@@ -9,6 +9,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "cli/calibration.h"
+#include "cli/denoise_budget.h"
 #include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
@@ -43,18 +45,11 @@ FilePattern beside(const FilePattern& output, const std::string& component) {
   return result;
 }
 
-// Whether a choice of guide is a file's name.
-bool isFile(const std::string& guide) {
-  for (const char* word : {"auto", "nlm", "oidn", "none"})
-    if (guide == word) return false;
-  return true;
-}
-
 FrameInputs inputsAt(const DenoiseRequest& request, const FilePattern& input, int frame) {
   const auto at = [&](const std::string& path) { return path.empty() ? path : parsePattern(path).at(frame); };
   FrameInputs inputs{input.at(frame), at(request.features), {}, at(request.alpha), {}};
   for (size_t i = 0; i < request.halves.size(); ++i) inputs.halves[i] = at(request.halves[i]);
-  if (isFile(request.guide)) inputs.guide = at(request.guide);
+  if (isGuideFile(request.guide)) inputs.guide = at(request.guide);
   return inputs;
 }
 
@@ -148,20 +143,37 @@ void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   if (inputs.components) note(fmt::format("diffuse.* and specular.* are left out: {} denoises their sum", name));
 }
 
-// What guides the bins of deep frames; --base says it, too.
+// What guides the bins of deep frames.
 void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOptions& options,
               const std::vector<FrameInputs>& candidates) {
-  const std::string choice =
-      request.guide == "auto" && request.base.name != kOwnBase ? request.base.name : request.guide;
   const auto first =
       std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
   FrameSource source = openFrame(*first, options, plan);
-  plan.guide = planGuide(choice, request.base, plan.denoise, source, decodedLimit(request.memory), plan.notes);
+  plan.guide =
+      planGuide(guideChoice(request), request.base, plan.denoise, source, decodedLimit(request.memory), plan.notes);
   plan.denoise.guided = plan.guide.has_value();
 }
 
+// The files that the frames of the whole sequence come to.
+std::vector<std::string> outputsOf(const DenoiseRequest& request, const Sequence& sequence) {
+  const FilePattern output = outputPattern("-o", request.output, sequence.pattern);
+  std::vector<std::string> files;
+  for (const int frame : output.numbered() ? framesOnDisk(output) : sequence.frames) files.push_back(output.at(frame));
+  return files;
+}
+
+// Decides what a time budget leaves to be decided: in the plan, and in the request for what comes after it.
+void setBudget(SequencePlan& plan, DenoiseRequest& request, const Sequence& sequence) {
+  const BudgetPlan budget = planBudget(request, plan, outputsOf(request, sequence),
+                                       [] { return calibrationSeconds() / measuredCalibration(); });
+  plan.record = BudgetRecord{describeBudget(*request.timeBudget), describeSetting(budget.setting)};
+  plan.notes.insert(budget.note);
+  request = withSetting(std::move(request), budget.setting);
+  plan.denoise.params = request.params;
+}
+
 // From the first frame of the sequence on disk, whether it is among the job's or not.
-SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, const SourceOptions& source,
+SequencePlan makePlan(DenoiseRequest request, const Sequence& sequence, const SourceOptions& source,
                       const std::string& wanted) {
   std::vector<FrameInputs> candidates;
   for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
@@ -172,6 +184,7 @@ SequencePlan makePlan(const DenoiseRequest& request, const Sequence& sequence, c
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
   if (request.components && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
+  if (request.timeBudget) setBudget(plan, request, sequence);
   if (plan.deep)
     setGuide(plan, request, source, candidates);
   else if (request.base.name != kOwnBase)
@@ -188,6 +201,16 @@ flat::Image toFlatFrame(deep::DeepImage image, std::map<std::string, std::string
 }
 
 }  // namespace
+
+bool isGuideFile(const std::string& guide) {
+  for (const char* word : {"auto", "nlm", "oidn", "none"})
+    if (guide == word) return false;
+  return true;
+}
+
+std::string guideChoice(const DenoiseRequest& request) {
+  return request.guide == "auto" && request.base.name != kOwnBase ? request.base.name : request.guide;
+}
 
 DenoiseJob makeDenoiseJob(const DenoiseRequest& request, const Sequence& sequence, bool overlap) {
   DenoiseJob job = jobWithoutPlan(request, sequence, overlap);

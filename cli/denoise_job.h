@@ -1,6 +1,7 @@
 // What is asked of the denoiser, by a command line or a window, made into the work on a sequence.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,11 +22,21 @@ struct DenoiseRequest {
   std::string map, part;
   deep::DenoiseParams params;
   BaseOptions base;
+  // Seconds a frame, for its denoising: chooses the quality, and what else is left open, in the place of `params` (see
+  // cli/denoise_budget).
+  std::optional<double> timeBudget;
+  bool anyBase = false;  // the budget may choose the base of flat frames, too
   bool components = false;
   bool errors = false;  // error.{R,G,B} beside the colours
   bool overwrite = false;
   size_t memory = size_t(8) << 30;
 };
+
+// Whether a choice of guide is a file's name.
+bool isGuideFile(const std::string& guide);
+
+// The guide that is asked for: --base says it, too.
+std::string guideChoice(const DenoiseRequest& request);
 
 // The frames of `sequence`, which is that of the input, or a part of it. The plan comes from the first frame on disk,
 // whether it is among them or not. Throws Error, and CLI::ValidationError where outputs are named in a way that cannot

@@ -67,17 +67,22 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   plan.deep = source.deep();
   findInputs(plan, source);
   wantInputs(plan.denoise, false, source);
+  const auto look = [&](const deep::DeepImage& image) {
+    plan.denoise.level = deep::meanLevel(image);
+    plan.pixels = image.pixels();
+    plan.samples = image.samples();
+  };
   const Box window = source.part().dataWindow;
   if (wanted && source.hasStatistics() && source.decodedBytes(window.y0, window.y1) <= decodedLimit(options.memory)) {
     plan.firstImage = source.read(plan.notes);
-    plan.denoise.level = deep::meanLevel(*plan.firstImage);
+    look(*plan.firstImage);
     return plan;
   }
   source.want([](const std::string& name) {
     return name == "R" || name == "G" || name == "B" || name == "A" || name == "Z" || name == "ZBack";
   });
   const deep::DeepImage colours = source.read(plan.notes);
-  plan.denoise.level = deep::meanLevel(colours);
+  look(colours);
   plan.cameraSamples = plan.deep && !source.hasStatistics() && holdsCameraSamples(colours);
   if (plan.cameraSamples) {
     plan.notes = {fmt::format("{}: one deep sample per camera sample: clustered into bins first", inputs.main)};

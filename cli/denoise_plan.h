@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/base_denoiser.h"
+#include "cli/denoise_setting.h"
 #include "cli/frame_guide.h"
 #include "cli/frame_source.h"
 #include "deep/denoise.h"
@@ -25,11 +26,13 @@ struct SequencePlan {
   bool cameraSamples = false;  // they hold one deep sample per camera sample, which are clustered first
   // Denoises the frames, which are flat, instead of `denoise`; none: nothing does. It needs whole frames.
   std::optional<BaseDenoiser> base;
-  std::optional<GuidePlan> guide;  // of deep frames
-  bool errors = false;             // error.{R,G,B} beside the colours; it needs whole frames
-  std::set<std::string> notes;     // lines for the user
+  std::optional<GuidePlan> guide;      // of deep frames
+  bool errors = false;                 // error.{R,G,B} beside the colours; it needs whole frames
+  std::optional<BudgetRecord> record;  // what a time budget chose, for the outputs to say
+  std::set<std::string> notes;         // lines for the user
   // The main file that this was decided from; and where it is wanted and fits the memory, the image as it is denoised.
   std::string first;
+  size_t pixels = 0, samples = 0;  // of that file
   std::optional<deep::DeepImage> firstImage;
 };
 

@@ -66,14 +66,6 @@ GuidePlan oidnGuide(const std::shared_ptr<const flat::OidnLibrary>& library, boo
           fmt::format("{} bins {}", flat::describeOidn(*library, params), flat::describeOidn(*library, bins))};
 }
 
-std::shared_ptr<const flat::OidnLibrary> oidnIfThere(const std::string& path) {
-  try {
-    return flat::loadOidn(path);
-  } catch (const Error&) {
-    return nullptr;
-  }
-}
-
 // The expected squared error of a denoiser, relative to what it makes of the picture.
 double expectedError(const flat::Image& noisy, const flat::Denoiser& denoise, float level) {
   const flat::Noise noise = flat::noiseOf(noisy);
@@ -97,10 +89,6 @@ flat::Image middleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
   return flat::crop(input.noisy, {x0, y0, x0 + width, y0 + height});
 }
 
-bool saysItsNoise(const deep::DenoiseInputs& inputs) {
-  return inputs.variance || inputs.halves;
-}
-
 // Which way of Open Image Denoise, or our own filter.
 GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, const deep::DenoisePlan& plan,
                     FrameSource& source, size_t scratch, bool ownToo, std::string& name) {
@@ -122,17 +110,21 @@ GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, con
 
 }  // namespace
 
+bool canBeGuided(const deep::DenoiseInputs& inputs) {
+  return inputs.variance || inputs.halves;
+}
+
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t scratch, std::set<std::string>& notes) {
   if (choice == "none") return {};
-  if (!saysItsNoise(plan.inputs)) {
+  if (!canBeGuided(plan.inputs)) {
     if (choice == "auto") return {};
     fail("{}: expected variance.* or half0.* and half1.* for --flat-guide, found neither", source.path());
   }
   if (choice == "nlm") return nlmGuide(plan);
   if (choice != "auto" && choice != "oidn") return GuidePlan{{}, true, "file"};
   if (choice == "auto" && plan.params.quality == deep::Quality::Fast) return {};
-  const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : oidnIfThere(base.oidnLibrary);
+  const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : findOidn(base.oidnLibrary);
   if (!library) return nlmGuide(plan);
   std::string name;
   GuidePlan guide = bestGuide(library, plan, source, scratch, choice == "auto", name);

@@ -18,6 +18,9 @@ struct GuidePlan {
   std::string settings;            // all that decides what it makes, as text to be hashed
 };
 
+// Whether frames that offer this say enough of their noise to be guided.
+bool canBeGuided(const deep::DenoiseInputs& inputs);
+
 // The plan for a choice: auto, nlm, oidn, none (then there is none) or a file. `auto` is Open Image Denoise where it is
 // found and its expected error (flat/sure, on the middle of the first frame, `source`) is smaller than that of our own
 // flat filter; that one else; none for Quality::Fast and for frames that say nothing of their noise. Adds to `notes` what

@@ -40,6 +40,16 @@ void append(flat::Image& whole, const flat::Image& rows) {
   }
 }
 
+// What an output says of how it was made. An input may say so of itself, which is not passed on.
+std::map<std::string, std::string> ownAttributes(const FrameOrigin& origin) {
+  std::map<std::string, std::string> result = {{kMadeBy, origin.madeBy}};
+  if (origin.record) {
+    result[kBudget] = origin.record->budget;
+    result[kSetting] = origin.record->setting;
+  }
+  return result;
+}
+
 }  // namespace
 
 // One file: deep rows go through a Writer, flat ones are gathered.
@@ -55,7 +65,7 @@ class FrameSink::Output {
 
   void finish(const FrameOrigin& origin) {
     if (writer_) return writer_->finish();
-    flat_->attributes[kMadeBy] = origin.madeBy;
+    for (const auto& [name, text] : ownAttributes(origin)) flat_->attributes[name] = text;
     flat::write(path_, *flat_);
   }
 
@@ -74,7 +84,9 @@ class FrameSink::Output {
       deep::DeepImage layout = rows.copyLayout();
       for (const deep::Channel& channel : rows.channels)
         layout.channels.push_back({channel.name, channel.type, {}, {}});
-      layout.attributes.set(kMadeBy, origin.madeBy);
+      layout.attributes.erase(kBudget);
+      layout.attributes.erase(kSetting);
+      for (const auto& [name, text] : ownAttributes(origin)) layout.attributes.set(name, text);
       deep::WriteOptions options;
       options.otherPartsOf = origin.path;
       options.replacedPart = origin.part;
@@ -85,7 +97,10 @@ class FrameSink::Output {
 
   void gather(const flat::Image& rows, const FrameOrigin& origin,
               const std::map<std::string, std::string>& attributes) {
-    if (!flat_) flat_ = flat::Image{origin.dataWindow, rows.displayWindow, {}, attributes};
+    if (!flat_) {
+      flat_ = flat::Image{origin.dataWindow, rows.displayWindow, {}, attributes};
+      for (const char* name : {kBudget, kSetting}) flat_->attributes.erase(name);
+    }
     append(*flat_, rows);
   }
 

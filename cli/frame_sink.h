@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/denoise_setting.h"
 #include "deep/image.h"
 #include "deep/io.h"
 #include "flat/image.h"
@@ -38,6 +39,7 @@ struct FrameOrigin {
   Box dataWindow;
   std::map<std::string, std::string> flatAttributes;
   std::string madeBy;
+  std::optional<BudgetRecord> record;
 };
 
 class FrameSink {

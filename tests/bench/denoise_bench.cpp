@@ -179,7 +179,7 @@ Table errorTable(const std::vector<std::string>& frames, const std::map<std::str
   }
   table.add(mean);
   table.add(time);
-  writeLogPlot(picture, "seconds per megapixel", "relMSE, flattened", points);
+  writeSvg(picture, {"", "seconds per megapixel", "relMSE, flattened", points});
   return table;
 }
 

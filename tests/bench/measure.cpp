@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -42,6 +43,12 @@ double median(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
+double geometricMean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += std::log(std::max(value, 1e-9));
+  return std::exp(sum / double(values.size()));
+}
+
 std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats) {
   std::vector<std::vector<double>> seconds(cases.size());
   for (const auto& run : cases) run();
@@ -60,21 +67,53 @@ size_t peakGrowth(const std::function<void()>& work) {
   return std::max(statusBytes("VmHWM:"), before) - before;
 }
 
-void Table::print() const {
+std::string markdownOf(const Table& table) {
   std::vector<size_t> widths;
-  for (size_t c = 0; c < columns_.size(); ++c) {
-    widths.push_back(columns_[c].size());
-    for (const auto& row : rows_) widths[c] = std::max(widths[c], row[c].text().size());
+  for (size_t c = 0; c < table.columns().size(); ++c) {
+    widths.push_back(table.columns()[c].size());
+    for (const auto& row : table.rows()) widths[c] = std::max(widths[c], row[c].text().size());
   }
-  fmt::print("\n{}\n\n", title_);
+  std::string text = fmt::format("\n{}\n\n", table.title());
   const auto line = [&](auto&& cell) {
-    for (size_t c = 0; c < columns_.size(); ++c) fmt::print("{}{:<{}}", c == 0 ? "| " : " | ", cell(c), widths[c]);
-    fmt::print(" |\n");
+    for (size_t c = 0; c < widths.size(); ++c)
+      text += fmt::format("{}{:<{}}", c == 0 ? "| " : " | ", cell(c), widths[c]);
+    text += " |\n";
   };
-  line([&](size_t c) { return columns_[c]; });
+  line([&](size_t c) { return table.columns()[c]; });
   line([&](size_t c) { return std::string(widths[c], '-'); });
-  for (const auto& row : rows_) line([&](size_t c) { return row[c].text(); });
+  for (const auto& row : table.rows()) line([&](size_t c) { return row[c].text(); });
+  return text;
+}
+
+std::string csvOf(const Table& table) {
+  const auto quoted = [](const std::string& word) {
+    if (word.find_first_of(",\"\n") == std::string::npos) return word;
+    std::string result = "\"";
+    for (const char c : word) result.append(c == '"' ? 2 : 1, c);
+    result += '"';
+    return result;
+  };
+  std::string text;
+  const auto line = [&](size_t cells, auto&& cell) {
+    for (size_t c = 0; c < cells; ++c) text.append(c == 0 ? "" : ",").append(cell(c));
+    text += '\n';
+  };
+  line(table.columns().size(), [&](size_t c) { return quoted(table.columns()[c]); });
+  for (const auto& row : table.rows())
+    line(row.size(),
+         [&](size_t c) { return row[c].number() ? fmt::format("{}", *row[c].number()) : quoted(row[c].text()); });
+  return text;
+}
+
+void Table::print() const {
+  fmt::print("{}", markdownOf(*this));
   std::fflush(stdout);
+}
+
+void writeText(const std::string& path, const std::string& text) {
+  std::ofstream out(path);
+  out << text;
+  if (!out.flush()) fail("{}: cannot be written", path);
 }
 
 void writeJson(const std::string& path, const std::vector<Table>& tables) {
@@ -91,9 +130,7 @@ void writeJson(const std::string& path, const std::vector<Table>& tables) {
       rows.push_back(std::move(object));
     }
   }
-  std::ofstream out(path);
-  out << json.dump(2) << '\n';
-  if (!out.flush()) fail("{}: cannot be written", path);
+  writeText(path, json.dump(2) + '\n');
 }
 
 }  // namespace fathom::bench

@@ -16,6 +16,9 @@ std::vector<double> interleavedMedians(const std::vector<std::function<void()>>&
 
 double median(std::vector<double> values);
 
+// Of positive values; what is below 1e-9 counts as that. NaN where there is none.
+double geometricMean(const std::vector<double>& values);
+
 // How many bytes the process grew by at most while `work` ran (resident set; Linux keeps its peak).
 size_t peakGrowth(const std::function<void()>& work);
 
@@ -51,6 +54,14 @@ class Table {
   std::vector<std::string> columns_;
   std::vector<std::vector<Cell>> rows_;
 };
+
+// The title as a heading and the rows as Markdown; columns are as wide as they need to be.
+std::string markdownOf(const Table& table);
+// A line for the columns and one a row; numbers in full; words in quotes where they have a comma, a quote or a line's end in
+// them.
+std::string csvOf(const Table& table);
+
+void writeText(const std::string& path, const std::string& text);
 
 // All tables of a benchmark: {"title": [{"column": value, ...}, ...], ...}.
 void writeJson(const std::string& path, const std::vector<Table>& tables);

@@ -1,0 +1,100 @@
+#include "cli/denoise_budget.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "flat/error.h"
+#include "flat/sure.h"
+
+namespace fathom::cli {
+
+namespace {
+
+// Bins per pixel where camera samples are clustered first: more than they come to on renders.
+constexpr double kMostClustered = 3;
+
+// The guides or bases that a setting may have.
+std::vector<std::string> openWays(const DenoiseRequest& request, const SequencePlan& plan) {
+  if (!plan.deep) {
+    if (!request.anyBase) return {request.base.name};
+    const bool network = !plan.denoise.inputs.components && !request.components && findOidn(request.base.oidnLibrary);
+    return network ? std::vector<std::string>{kOwnBase, "oidn"} : std::vector<std::string>{kOwnBase};
+  }
+  const std::string choice = guideChoice(request);
+  if (isGuideFile(choice)) return {kGuideFile};
+  if (choice != "auto") return {choice};
+  if (!canBeGuided(plan.denoise.inputs)) return {"none"};
+  if (findOidn(request.base.oidnLibrary)) return {"none", kOwnBase, "oidn"};
+  return {"none", kOwnBase};
+}
+
+// Whether a request lets a setting be; the library is not looked for, so that its absence is an error of its own.
+bool allows(const DenoiseRequest& request, const SequencePlan& plan, const DenoiseSetting& setting) {
+  if (setting.deep != plan.deep) return false;
+  if (!plan.deep) return request.anyBase || setting.with == request.base.name;
+  const std::string choice = guideChoice(request);
+  if (choice == "auto") return setting.with != kGuideFile;
+  return setting.with == (isGuideFile(choice) ? kGuideFile : choice);
+}
+
+Workload workloadOf(const SequencePlan& plan) {
+  const auto pixels = double(std::max<size_t>(plan.pixels, 1));
+  const double perPixel = double(plan.samples) / pixels;
+  return {pixels * 1e-6, plan.cameraSamples ? std::min(perPixel, kMostClustered) : perPixel,
+          plan.denoise.inputs.components, plan.errors ? 1 + flat::SureParams().probes : 1};
+}
+
+// What the outputs say, and the file that says it.
+struct Found {
+  std::string path;
+  BudgetRecord record;
+};
+std::optional<Found> findRecord(const std::vector<std::string>& outputs, const std::string* budget) {
+  for (const std::string& path : outputs)
+    if (const auto record = readRecord(path); record && (!budget || record->budget == *budget))
+      return Found{path, *record};
+  return {};
+}
+
+}  // namespace
+
+std::string describeBudget(double seconds) {
+  return fmt::format("{} s", seconds);
+}
+
+BudgetPlan planBudget(const DenoiseRequest& request, const SequencePlan& plan, const std::vector<std::string>& outputs,
+                      const std::function<double()>& slowness) {
+  const std::string budget = describeBudget(*request.timeBudget);
+  if (const auto found = findRecord(outputs, request.overwrite ? &budget : nullptr)) {
+    const auto setting = parseSetting(found->record.setting);
+    if (setting && allows(request, plan, *setting))
+      return {*setting, fmt::format("{}: made with {} for {} a frame, which the sequence keeps", found->path,
+                                    found->record.setting, found->record.budget)};
+    if (!request.overwrite)
+      fail(
+          "{}: expected a setting that these options allow, as its sequence keeps to one; found {} (--overwrite "
+          "chooses anew)",
+          found->path, found->record.setting);
+  }
+  const std::vector<std::string> ways = openWays(request, plan);
+  const BudgetChoice choice =
+      chooseSetting(costsOf(plan.deep, ways), workloadOf(plan), *request.timeBudget, slowness());
+  const std::string setting = describeSetting(choice.setting);
+  if (!choice.fits)
+    return {choice.setting, fmt::format("{}: {} a frame are too few; the quickest setting, {}, takes about {:.2g} s",
+                                        plan.first, budget, setting, choice.seconds)};
+  return {choice.setting,
+          fmt::format("{}: {} a frame allow {}, about {:.2g} s", plan.first, budget, setting, choice.seconds)};
+}
+
+DenoiseRequest withSetting(DenoiseRequest request, const DenoiseSetting& setting) {
+  request.params.quality = setting.quality;
+  if (!setting.deep)
+    request.base.name = setting.with;
+  else if (setting.with != kGuideFile)
+    request.guide = setting.with;
+  return request;
+}
+
+}  // namespace fathom::cli

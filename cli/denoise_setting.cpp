@@ -1,0 +1,56 @@
+#include "cli/denoise_setting.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "cli/frame_sink.h"
+#include "deep/io.h"
+#include "flat/error.h"
+
+namespace fathom::cli {
+
+namespace {
+
+const char* nameOf(deep::Quality quality) {
+  switch (quality) {
+    case deep::Quality::Fast:
+      return "fast";
+    case deep::Quality::Best:
+      return "best";
+    default:
+      return "balanced";
+  }
+}
+
+}  // namespace
+
+std::string describeSetting(const DenoiseSetting& setting) {
+  return fmt::format("--quality {} {} {}", nameOf(setting.quality), setting.deep ? "--flat-guide" : "--base",
+                     setting.with);
+}
+
+std::optional<DenoiseSetting> parseSetting(const std::string& text) {
+  for (const deep::Quality quality : {deep::Quality::Fast, deep::Quality::Balanced, deep::Quality::Best})
+    for (const bool isDeep : {true, false})
+      for (const char* with : {"none", "nlm", "oidn", kGuideFile})
+        if (const DenoiseSetting setting{quality, isDeep, with}; describeSetting(setting) == text) return setting;
+  return {};
+}
+
+std::optional<BudgetRecord> readRecord(const std::string& path) {
+  std::error_code none;
+  if (!std::filesystem::exists(path, none)) return {};
+  try {
+    for (const deep::PartInfo& part : deep::readParts(path)) {
+      const auto made = part.attributes.getString(kMadeBy), budget = part.attributes.getString(kBudget),
+                 setting = part.attributes.getString(kSetting);
+      if (made && budget && setting) return BudgetRecord{*budget, *setting};
+    }
+  } catch (const Error&) {
+    // Not even an EXR file: that is for the run itself to say.
+  }
+  return {};
+}
+
+}  // namespace fathom::cli

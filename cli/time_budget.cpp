@@ -1,0 +1,79 @@
+#include "cli/time_budget.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace fathom::cli {
+
+namespace {
+
+using deep::Quality;
+
+// The share of the time of our own filters that is left where the colour is one component (staircase2 at 8 samples).
+constexpr double kOneComponent = 0.75;
+
+// What `./run bench pareto FOLDER 0.25 2` printed as "For cli/time_budget.cpp" for the eight renders of the README, on two
+// cores that were shared with other work.
+const std::vector<SettingCost>& table() {
+  static const std::vector<SettingCost> costs = {
+      {{Quality::Fast, true, "none"}, 0, 2.11, 0, 0.165},
+      {{Quality::Balanced, true, "none"}, 0, 2.89, 0, 0.152},
+      {{Quality::Best, true, "none"}, 0, 6.03, 0, 0.143},
+      {{Quality::Fast, true, "nlm"}, 3.08, 2.11, 0, 0.164},
+      {{Quality::Balanced, true, "nlm"}, 3.97, 2.89, 0, 0.151},
+      {{Quality::Best, true, "nlm"}, 7.95, 6.03, 0, 0.142},
+      {{Quality::Fast, true, "oidn"}, 0, 2.11, 25.3, 0.107},
+      {{Quality::Balanced, true, "oidn"}, 0, 2.89, 25.3, 0.106},
+      {{Quality::Best, true, "oidn"}, 0, 6.03, 25.3, 0.105},
+      {{Quality::Fast, false, "nlm"}, 1.69, 0, 0, 0.149},
+      {{Quality::Balanced, false, "nlm"}, 2.45, 0, 0, 0.133},
+      {{Quality::Best, false, "nlm"}, 5.2, 0, 0, 0.123},
+      {{Quality::Fast, false, "oidn"}, 0, 0, 1.44, 0.108},
+      {{Quality::Balanced, false, "oidn"}, 0, 0, 16.2, 0.0897},
+  };
+  return costs;
+}
+
+constexpr double kCalibration = 0.154;
+
+}  // namespace
+
+std::span<const SettingCost> measuredCosts() {
+  return table();
+}
+
+double measuredCalibration() {
+  return kCalibration;
+}
+
+std::vector<SettingCost> costsOf(bool deep, std::span<const std::string> with) {
+  std::vector<SettingCost> result;
+  for (const std::string& wanted : with)
+    for (SettingCost cost : measuredCosts()) {
+      if (cost.setting.deep != deep || cost.setting.with != (wanted == kGuideFile ? "none" : wanted)) continue;
+      cost.setting.with = wanted;
+      result.push_back(cost);
+    }
+  return result;
+}
+
+double expectedSeconds(const SettingCost& cost, const Workload& workload, double slowness) {
+  const double filters = cost.perMegapixel + cost.perMillionBins * workload.binsPerPixel;
+  const double perMegapixel = cost.network + filters * (workload.components ? 1 : kOneComponent);
+  return slowness * workload.runs * workload.megapixels * perMegapixel;
+}
+
+BudgetChoice chooseSetting(std::span<const SettingCost> costs, const Workload& workload, double budget,
+                           double slowness) {
+  const auto seconds = [&](const SettingCost& cost) { return expectedSeconds(cost, workload, slowness); };
+  const auto rank = [&](const SettingCost& cost) {
+    const double time = seconds(cost);
+    const bool late = !(time <= budget);
+    return std::tuple(late, late ? time : cost.error, time);
+  };
+  const SettingCost& best =
+      *std::ranges::min_element(costs, [&](const SettingCost& a, const SettingCost& b) { return rank(a) < rank(b); });
+  return {best.setting, seconds(best), seconds(best) <= budget};
+}
+
+}  // namespace fathom::cli
