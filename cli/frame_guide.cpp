@@ -125,7 +125,7 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
   if (choice != "auto" && choice != "oidn") return GuidePlan{{}, true, "file"};
   if (choice == "auto" && plan.params.quality == deep::Quality::Fast) return {};
   const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : findOidn(base.oidnLibrary);
-  if (!library) return nlmGuide(plan);
+  if (!library) return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
   std::string name;
   GuidePlan guide = bestGuide(library, plan, source, scratch, choice == "auto", name);
   notes.insert(fmt::format("{}: bins are guided by {}, which promises the least error", source.path(), name));

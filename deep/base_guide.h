@@ -30,7 +30,7 @@ struct ConsistencyParams {
 };
 
 // For a guide that errs as much as the bins' sum, and alike: our own filter on flat pixels.
-inline constexpr ConsistencyParams kOwnGuide{.alphaNoise = 1, .mix = {.prior = 0.85f, .strength = 20}};
+inline constexpr ConsistencyParams kOwnGuide{.alphaNoise = 0.5f, .mix = {.prior = 0.8f, .strength = 20}};
 
 struct GuideDenoisers {
   flat::Denoiser flattened;

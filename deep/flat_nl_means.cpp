@@ -40,6 +40,7 @@ DenoisePlan planFlattened(const DenoisePlan& plan) {
   result.inputs.halfCounts = false;
   result.inputs.volumes = false;
   result.guided = false;
+  result.params.gate = false;
   return result;
 }
 

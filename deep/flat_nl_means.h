@@ -10,7 +10,7 @@ namespace fathom::deep {
 // The plan for a flat image taken by itself: what it offers, and its mean colour.
 DenoisePlan planFlat(const flat::Image& image, const DenoiseParams& params);
 
-// The plan for what flattenNoisy makes of frames with this one.
+// The plan for what flattenNoisy makes of frames with this one, as a guide (which is gated when it is done).
 DenoisePlan planFlattened(const DenoisePlan& plan);
 
 // The denoiser of such a plan.

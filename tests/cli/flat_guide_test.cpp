@@ -44,14 +44,12 @@ class FlatGuide : public ::testing::Test {
   }
 };
 
-TEST_F(FlatGuide, AutoIsOurOwnFilterWithoutAnother) {
-  const std::vector<float> own = red("--flat-guide nlm");
-  EXPECT_EQ(red(""), own);
-  EXPECT_NE(red("--flat-guide none"), own);
-}
-
-TEST_F(FlatGuide, AutoIsNothingForFast) {
-  EXPECT_EQ(red("--quality fast"), red("--quality fast --flat-guide none"));
+TEST_F(FlatGuide, AutoIsOurOwnFilterForTheBestAndElseNone) {
+  const std::vector<float> own = red("--quality best --flat-guide nlm");
+  EXPECT_EQ(red("--quality best"), own);
+  EXPECT_NE(red("--quality best --flat-guide none"), own);
+  for (const std::string quality : {"fast", "balanced"})
+    EXPECT_EQ(red("--quality " + quality), red("--quality " + quality + " --flat-guide none"));
 }
 
 TEST_F(FlatGuide, AFileGuides) {
