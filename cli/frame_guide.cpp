@@ -108,6 +108,13 @@ GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, con
   return best;
 }
 
+// The plan's denoisers, or one that reads the frame's file.
+deep::GuideDenoisers denoisersOf(const GuidePlan& guide, const FrameInputs& inputs) {
+  deep::GuideDenoisers denoisers = guide.denoisers;
+  if (!denoisers.flattened) denoisers.flattened = fileDenoiser(inputs.guide);
+  return denoisers;
+}
+
 }  // namespace
 
 bool canBeGuided(const deep::DenoiseInputs& inputs) {
@@ -134,20 +141,16 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
 
 deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, const FrameInputs& inputs,
                         const deep::DenoisePlan& plan, const Progress& progress) {
-  if (guide.denoisers.flattened)
-    return deep::makeGuide(deep::guideInput(image, plan.inputs, bool(guide.denoisers.bins)), guide.denoisers,
-                           plan.level, progress);
-  return deep::makeGuide(deep::guideInput(image, plan.inputs, false), {fileDenoiser(inputs.guide), {}, {}}, plan.level,
-                         progress);
+  const deep::GuideDenoisers denoisers = denoisersOf(guide, inputs);
+  return deep::makeGuide(deep::guideInput(image, plan.inputs, bool(denoisers.bins)), denoisers, plan.level, progress);
 }
 
 deep::BaseGuide readGuide(FrameSource& source, int rowsAtOnce, const GuidePlan& guide, const FrameInputs& inputs,
                           const deep::DenoisePlan& plan) {
   const Box& window = source.part().dataWindow;
-  const bool file = !guide.denoisers.flattened;
-  return deep::makeGuide(
-      readInput(source, window.y0, window.y1, rowsAtOnce, plan.inputs, !file && bool(guide.denoisers.bins)),
-      file ? deep::GuideDenoisers{fileDenoiser(inputs.guide), {}, {}} : guide.denoisers, plan.level, {});
+  const deep::GuideDenoisers denoisers = denoisersOf(guide, inputs);
+  return deep::makeGuide(readInput(source, window.y0, window.y1, rowsAtOnce, plan.inputs, bool(denoisers.bins)),
+                         denoisers, plan.level, {});
 }
 
 }  // namespace fathom::cli

@@ -107,7 +107,8 @@ void addVariance(const DeepImage& image, const std::string& name, bool premultip
 
 void addDepth(const DeepImage& image, const Shares& shares, flat::Image& result) {
   const std::span<const float> z = image.get("Z");
-  Buffer<float>&out = result.add("Z").values, &alpha = result.add("A").values;
+  // Values stay where they are when planes are added; planes do not.
+  float *const out = result.add("Z").values.data(), *const alpha = result.add("A").values.data();
   forPixels(image, [&](size_t pixel, size_t begin, size_t end) {
     double seen = 0, sum = 0;
     for (size_t b = begin; b < end; ++b) {

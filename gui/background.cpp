@@ -3,6 +3,7 @@
 #include <CLI/Error.hpp>
 #include <exception>
 #include <new>
+#include <utility>
 
 #include "flat/error.h"
 
@@ -23,17 +24,31 @@ QString describeException() {
 }
 
 Caller::Caller() {
-  connect(
-      this, &Caller::call, this, [](const std::function<void()>& what) { what(); }, Qt::QueuedConnection);
+  connect(this, &Caller::came, this, &Caller::callNext, Qt::QueuedConnection);
 }
 
-Background::Background(QObject* parent) : QObject(parent) {
-  thread_.setMaxThreadCount(1);
+void Caller::call(std::function<void()> what) {
+  {
+    const std::scoped_lock lock(mutex_);
+    waiting_.push_back(std::move(what));
+  }
+  emit came();
 }
+
+void Caller::callNext() {
+  std::function<void()> what;
+  {
+    const std::scoped_lock lock(mutex_);
+    what = std::move(waiting_.front());
+    waiting_.pop_front();
+  }
+  what();
+}
+
+Background::Background(QObject* parent) : QObject(parent) {}
 
 Background::~Background() {
   stop_.request_stop();
-  thread_.waitForDone();
 }
 
 void Background::run(Work work) {
@@ -52,7 +67,7 @@ void Background::clear() {
 void Background::start(Work work) {
   running_ = true;
   stop_ = std::stop_source();
-  thread_.start([this, work = std::move(work), generation = generation_, token = stop_.get_token()]() mutable {
+  thread_.run([this, work = std::move(work), generation = generation_, token = stop_.get_token()]() mutable {
     Deliver deliver;
     QString error;
     try {
@@ -61,7 +76,7 @@ void Background::start(Work work) {
       error = describeException();
     }
     work = nullptr;  // what it holds goes in this thread
-    emit caller_.call([this, generation, deliver, error] { arrived(generation, deliver, error); });
+    caller_.call([this, generation, deliver, error] { arrived(generation, deliver, error); });
   });
 }
 

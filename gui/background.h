@@ -3,27 +3,37 @@
 
 #include <QObject>
 #include <QString>
-#include <QThreadPool>
+#include <deque>
 #include <functional>
+#include <mutex>
 #include <stop_token>
 
 #include "flat/progress.h"
+#include "gui/worker.h"
 
 namespace fathom::gui {
 
 // The exception that is being handled, as one line.
 QString describeException();
 
-// Calls functions in the thread that it lives in, later and in the order that they come; nothing once it is gone.
+// Calls functions in the thread that it lives in, later and in the order that they come; nothing once it is gone. Qt
+// wakes it; the functions go by a queue of its own (see Worker).
 class Caller : public QObject {
   Q_OBJECT
 
  public:
   Caller();
+  // From any thread.
+  void call(std::function<void()> what);
 
  signals:
-  // Emitted from any thread.
-  void call(const std::function<void()>& what);
+  void came();
+
+ private:
+  void callNext();
+
+  std::mutex mutex_;  // of:
+  std::deque<std::function<void()>> waiting_;
 };
 
 // One thing runs at a time. What waits is replaced by what comes later.
@@ -59,7 +69,7 @@ class Background : public QObject {
   uint64_t generation_ = 0;  // of what may still deliver
   std::stop_source stop_;
   Caller caller_;
-  QThreadPool thread_;
+  Worker thread_;
 };
 
 }  // namespace fathom::gui

@@ -16,17 +16,9 @@ constexpr int kPoll = 2000;   // ms
 // A file that changed so recently and cannot be read is being written: it is tried again.
 constexpr std::chrono::nanoseconds kYoung = std::chrono::seconds(2);
 
-// Large pictures take a while to free.
-void dropElsewhere(PicturePtr& picture) {
-  if (!picture) return;
-  QThreadPool::globalInstance()->start([held = std::move(picture)]() mutable { held.reset(); });
-  picture.reset();
-}
-
 }  // namespace
 
 FrameCache::FrameCache(QObject* parent, Load load) : QObject(parent), load_(std::move(load)) {
-  thread_.setMaxThreadCount(1);
   settle_.setSingleShot(true);
   settle_.setInterval(kSettle);
   connect(&settle_, &QTimer::timeout, this, &FrameCache::lookAtFiles);
@@ -40,10 +32,6 @@ FrameCache::FrameCache(QObject* parent, Load load) : QObject(parent), load_(std:
     if (shownChanged()) settle();
   });
   poll_.start(kPoll);
-}
-
-FrameCache::~FrameCache() {
-  thread_.waitForDone();
 }
 
 FrameCache::Stamp FrameCache::stampOf(const std::string& path) {
@@ -98,14 +86,14 @@ void FrameCache::want(std::vector<std::string> paths, size_t shown) {
 
 void FrameCache::put(const std::string& name, PicturePtr picture) {
   Entry& entry = entries_[name];
-  dropElsewhere(entry.picture);
+  drop(entry.picture);
   entry = {std::move(picture), {}, {}, ++clock_, false, false};
   emit contentChanged();
 }
 
 void FrameCache::forgetMade() {
   for (auto& [name, entry] : entries_)
-    if (!entry.isFile) dropElsewhere(entry.picture);
+    if (!entry.isFile) drop(entry.picture);
   if (std::erase_if(entries_, [](const auto& of) { return !of.second.isFile; }) > 0) emit contentChanged();
 }
 
@@ -156,7 +144,7 @@ void FrameCache::lookAtFiles() {
       entry.waiting = false;
     } else if (changed && path != reading_) {
       dropped |= entry.picture != nullptr;
-      dropElsewhere(entry.picture);
+      drop(entry.picture);
       it = entries_.erase(it);
       continue;
     }
@@ -186,7 +174,7 @@ void FrameCache::readNext() {
 
 void FrameCache::read(const std::string& path) {
   reading_ = path;
-  thread_.start([this, path, load = load_, limit = limit_] {
+  thread_.run([this, path, load = load_, limit = limit_] {
     Outcome outcome;
     outcome.before = stampOf(path);
     try {
@@ -195,7 +183,7 @@ void FrameCache::read(const std::string& path) {
       outcome.failure = describeException();
     }
     outcome.after = stampOf(path);
-    emit caller_.call([this, path, outcome] { arrived(path, outcome); });
+    caller_.call([this, path, outcome] { arrived(path, outcome); });
   });
 }
 
@@ -210,7 +198,7 @@ void FrameCache::arrived(const std::string& path, const Outcome& outcome) {
   }
   entry.failure = outcome.failure;
   if (outcome.picture) {
-    dropElsewhere(entry.picture);
+    drop(entry.picture);
     entry.picture = outcome.picture;
     entry.used = ++clock_;
     usualBytes_ = entry.picture->bytes();
@@ -222,6 +210,13 @@ void FrameCache::arrived(const std::string& path, const Outcome& outcome) {
     emit failed(path, outcome.failure);
   emit contentChanged();
   readNext();
+}
+
+// In another thread: large pictures take a while to free.
+void FrameCache::drop(PicturePtr& picture) {
+  if (!picture) return;
+  dropping_.run([held = std::move(picture)] {});
+  picture.reset();
 }
 
 // Those not wanted, by their last use; then the wanted ones from the end.
@@ -238,7 +233,7 @@ void FrameCache::evict() {
     }
     if (victim == entries_.end()) return;
     sum -= victim->second.picture->bytes();
-    dropElsewhere(victim->second.picture);
+    drop(victim->second.picture);
     entries_.erase(victim);
   }
 }

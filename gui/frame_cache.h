@@ -4,7 +4,6 @@
 #include <QFileSystemWatcher>
 #include <QObject>
 #include <QString>
-#include <QThreadPool>
 #include <QTimer>
 #include <cstdint>
 #include <functional>
@@ -14,6 +13,7 @@
 
 #include "gui/background.h"
 #include "gui/picture.h"
+#include "gui/worker.h"
 
 namespace fathom::gui {
 
@@ -26,7 +26,7 @@ class FrameCache : public QObject {
 
   explicit FrameCache(QObject* parent = nullptr, Load load = {});
   // Waits for the file that is being read.
-  ~FrameCache() override;
+  ~FrameCache() override = default;
 
   // What the pictures may take together. Those shown stay even where they are larger; of the others those go first that
   // are not wanted, the least recently used one before others, then those that are wanted last. What was put stays, too.
@@ -92,6 +92,7 @@ class FrameCache : public QObject {
   void readNext();
   void read(const std::string& path);
   void arrived(const std::string& path, const Outcome& outcome);
+  void drop(PicturePtr& picture);
   void evict();
 
   Load load_;
@@ -106,7 +107,8 @@ class FrameCache : public QObject {
   QTimer settle_;  // files are looked at a moment after they have changed
   QTimer poll_;    // for folders of other machines, which the watcher does not hear of
   Caller caller_;
-  QThreadPool thread_;
+  Worker thread_;
+  Worker dropping_;
 };
 
 }  // namespace fathom::gui

@@ -11,13 +11,10 @@ constexpr double kStep = 0.002;  // of the progress, below which it is not told
 
 }  // namespace
 
-Jobs::Jobs(QObject* parent) : QObject(parent) {
-  thread_.setMaxThreadCount(1);
-}
+Jobs::Jobs(QObject* parent) : QObject(parent) {}
 
 Jobs::~Jobs() {
   stop_.request_stop();
-  thread_.waitForDone();
 }
 
 double Jobs::seconds() const {
@@ -60,9 +57,9 @@ void Jobs::startNext() {
       done_ = done;
       emit progressed(done);
     };
-    emit caller_.call(tell);
+    caller_.call(tell);
   };
-  thread_.start([this, work = std::move(job.work), progress = Progress{report, stop_.get_token()}]() mutable {
+  thread_.run([this, work = std::move(job.work), progress = Progress{report, stop_.get_token()}]() mutable {
     Outcome outcome;
     try {
       outcome.deliver = work(progress);
@@ -72,7 +69,7 @@ void Jobs::startNext() {
       outcome.error = describeException();
     }
     work = nullptr;  // what it holds goes in this thread
-    emit caller_.call([this, outcome] { arrived(outcome); });
+    caller_.call([this, outcome] { arrived(outcome); });
   });
 }
 

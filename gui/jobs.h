@@ -4,13 +4,13 @@
 #include <QElapsedTimer>
 #include <QObject>
 #include <QString>
-#include <QThreadPool>
 #include <deque>
 #include <functional>
 #include <stop_token>
 
 #include "flat/progress.h"
 #include "gui/background.h"
+#include "gui/worker.h"
 
 namespace fathom::gui {
 
@@ -66,7 +66,7 @@ class Jobs : public QObject {
   std::stop_source stop_;
   std::deque<Job> waiting_;
   Caller caller_;
-  QThreadPool thread_;
+  Worker thread_;
 };
 
 }  // namespace fathom::gui

@@ -32,6 +32,11 @@ Bytes packed(Compression compression, const Bytes& bytes, size_t rawSize) {
   return result;
 }
 
+// memcmp() may not be told of nothing at null, as an empty vector has it.
+bool sameBytes(const void* a, const void* b, size_t n) {
+  return n == 0 || std::memcmp(a, b, n) == 0;
+}
+
 TEST(ExrCodec, EveryLengthComesBack) {
   Unpacker unpacker;
   for (Compression compression : kAll)
@@ -42,7 +47,7 @@ TEST(ExrCodec, EveryLengthComesBack) {
         ASSERT_LE(file.size(), bytes.size());
         std::vector<uint32_t> back(values);
         unpacker.unpack(compression, file, bytes.size(), bytes.size()).copy(0, std::span<uint32_t>(back));
-        ASSERT_EQ(std::memcmp(back.data(), bytes.data(), bytes.size()), 0) << values;
+        ASSERT_TRUE(sameBytes(back.data(), bytes.data(), bytes.size())) << values;
       }
 }
 
@@ -57,7 +62,7 @@ TEST(ExrCodec, PiecesFromEveryPlace) {
         if (at + 4 * n > bytes.size()) continue;
         std::vector<float> floats(n), halves(n), expected(n);
         unpacked.copy(at, floats);
-        ASSERT_EQ(std::memcmp(floats.data(), bytes.data() + at, 4 * n), 0) << at;
+        ASSERT_TRUE(sameBytes(floats.data(), bytes.data() + at, 4 * n)) << at;
         unpacked.copyHalf(at, halves);
         for (size_t i = 0; i < n; ++i) {
           uint16_t bits;

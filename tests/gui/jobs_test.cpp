@@ -8,17 +8,22 @@
 #include <QProgressBar>
 #include <QSignalSpy>
 #include <QTest>
-#include <atomic>
+#include <memory>
 #include <semaphore>
+#include <thread>
+#include <vector>
 
 #include "flat/error.h"
 #include "gui/background.h"
 #include "gui/jobs_bar.h"
+#include "gui/worker.h"
 
 namespace fathom::gui {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::Ne;
 
 bool waitFor(const std::function<bool()>& condition) {
   return QTest::qWaitFor(condition, 20000);
@@ -140,6 +145,51 @@ TEST(Background, WhatWasClearedIsNotDelivered) {
   ASSERT_TRUE(waitFor([&] { return !background.busy(); }));
   EXPECT_THAT(delivered, ElementsAre(2));
   EXPECT_EQ(failed.count(), 0);
+}
+
+TEST(Worker, RunsEverythingInOrderBeforeItGoes) {
+  std::vector<int> ran, gone;
+  std::vector<std::thread::id> where;
+  {
+    std::binary_semaphore gate(0);
+    Worker worker;
+    worker.run([&] { gate.acquire(); });
+    for (const int number : {1, 2, 3}) {
+      const std::shared_ptr<void> held(nullptr, [&gone, number](void*) { gone.push_back(number); });
+      worker.run([&ran, &where, number, held] {
+        ran.push_back(number);
+        where.push_back(std::this_thread::get_id());
+      });
+    }
+    EXPECT_TRUE(ran.empty());
+    gate.release();
+  }
+  EXPECT_THAT(ran, ElementsAre(1, 2, 3));
+  EXPECT_THAT(gone, ElementsAre(1, 2, 3));
+  EXPECT_THAT(where, Each(Ne(std::this_thread::get_id())));
+}
+
+TEST(Caller, CallsInOrderInItsOwnThreadAndNothingOnceItIsGone) {
+  std::vector<int> called;
+  std::vector<std::thread::id> where;
+  auto caller = std::make_unique<Caller>();
+  const auto call = [&](int number) {
+    caller->call([&, number] {
+      called.push_back(number);
+      where.push_back(std::this_thread::get_id());
+    });
+  };
+  std::thread([&] {
+    for (const int number : {1, 2, 3}) call(number);
+  }).join();
+  EXPECT_TRUE(called.empty());
+  ASSERT_TRUE(waitFor([&] { return called.size() == 3; }));
+  EXPECT_THAT(called, ElementsAre(1, 2, 3));
+  EXPECT_THAT(where, Each(std::this_thread::get_id()));
+  call(4);
+  caller.reset();
+  QTest::qWait(1);
+  EXPECT_EQ(called.size(), 3u);
 }
 
 }  // namespace
