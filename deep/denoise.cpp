@@ -89,17 +89,17 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   progress.at(0);
   DenoiseData data = prepareColours(image, plan.inputs);
   clock.lap("prepare");
-  const std::vector<JointFilterParams> passes = filterPasses(plan);
+  const std::vector<FilterPass> passes = filterPasses(plan);
   std::vector<ComponentGuide> guides;
   for (const DenoiseComponent& component : data.components)
-    guides.push_back(colourGuide(data, component, guideBorder(passes.front())));
-  const Activity activity = findActivity(data, guides, image, plan.inputs, passes.back().radius, plan.level);
+    guides.push_back(colourGuide(data, component, passes.front().guideBorder()));
+  const Activity activity = findActivity(data, guides, image, plan.inputs, passes.back().radius(), plan.level);
   const auto ofPixels = pixelVariance(data, guides, plan.inputs);
   countPixels(data, activity, stats);
   clock.lap("guides");
   progress.at(0.05);
   int reach = 0;  // of the bank's windows, and a pixel more for gradients
-  for (const JointFilterParams& pass : passes) reach = std::max(reach, pass.radius + 1);
+  for (const FilterPass& pass : passes) reach = std::max(reach, pass.radius() + 1);
   prepareFeatures(image, plan.inputs, allWithin(activity.still, data.width, data.height, featureReach(reach)), data);
   dropStatistics(image, plan.params, false);
   clock.lap("prepare");
@@ -159,8 +159,8 @@ int denoiseHalo(const DenoisePlan& plan) {
   // error's and the blend's. The gate's window comes last.
   const int prefilter = kPrefilterRadius + kPrefilterPatchRadius + 1;
   int rows = 3;
-  for (const JointFilterParams& pass : filterPasses(plan))
-    rows = kBlendRadius + kErrorRadius + pass.radius + std::max(prefilter, pass.patchRadius + 2 + rows);
+  for (const FilterPass& pass : filterPasses(plan))
+    rows = kBlendRadius + kErrorRadius + std::max(pass.radius() + prefilter, pass.guideBorder() + 2 + rows);
   // A guide's mix of bins comes before the gate, its mix of pixels after it; where the guide is the same filter on flat
   // pixels, it has a gate of its own, and two rows more tell where its noise is known.
   const int guided = plan.guided ? kGateRadius + kConsistencyRadius + 2 : 0;

@@ -8,7 +8,7 @@ namespace fathom::deep {
 
 namespace {
 
-// Sums what the tiles of one pass did, from several threads, and tells how far they are.
+// Sums what the tiles of one bank did, from several threads, and tells how far they are.
 class TileCount {
  public:
   TileCount(const DenoiseData& data, const Progress& progress, double from, double to, FilterCounts& counts)
@@ -63,31 +63,58 @@ struct FeatureInput {
   }
 };
 
-// One pass: the bank's candidates for every component, blended; with pilots where pilotPad > 0.
-std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& features,
-                              std::span<const ComponentGuide> guides, const Activity& activity,
-                              const JointFilterParams& pass, float level, int pilotPad, TileCount& count) {
+// The candidates of one bank for every component, from `first` on.
+void filterBank(const DenoiseData& data, const FeatureInput& features, std::span<const ComponentGuide> guides,
+                const Activity& activity, const JointFilterParams& bank, int radius, int first,
+                std::vector<Candidates>& candidates, TileCount& count) {
   JointFilterInput input{data.width,        data.height, data.rowPhase,        data.offsets,
                          features.channels, {},          activity.still.data()};
-  std::vector<Candidates> candidates;
   for (size_t c = 0; c < data.components.size(); ++c) {
     const ComponentGuide& guide = guides[c];
     input.components.push_back(
         {data.components[c].data.data(), {&guide.value[0], &guide.value[1]}, {&guide.variance, &guide.variance}});
-    candidates.emplace_back(data, pass.candidates, pilotPad > 0);
   }
-  const auto active = [&](const Box& tile) { return activeComponents(data, activity, tile, pass.radius); };
+  const auto active = [&](const Box& tile) { return activeComponents(data, activity, tile, radius); };
   const auto consume = [&](const FilterTile& tile) {
     int c = 0;
     for (size_t i = 0; i < data.components.size(); ++i) {
       if (tile.active >> i & 1)
-        addCandidates(data, data.components[i], guides[i].variance, tile, c++, activity.still, candidates[i]);
+        addCandidates(data, data.components[i], guides[i].variance, tile, c++, first, activity.still, candidates[i]);
       else if (tile.active != 0)
         addDarkness(data, tile.box, candidates[i]);
     }
     count.add(tile);
   };
-  jointFilter(input, pass, active, consume);
+  jointFilter(input, bank, active, consume);
+}
+
+// In candidate pixels of the windows.
+double costOf(const JointFilterParams& bank) {
+  return double(2 * bank.radius + 1) * (2 * bank.radius + 1);
+}
+
+double costOf(const FilterPass& pass) {
+  double cost = 0;
+  for (const JointFilterParams& bank : pass.banks) cost += costOf(bank);
+  return cost;
+}
+
+// One pass: all candidates for every component, blended; with pilots where pilotPad > 0. `done` and `cost`: of the
+// banks before it, and of all.
+std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& features,
+                              std::span<const ComponentGuide> guides, const Activity& activity, const FilterPass& pass,
+                              float level, int pilotPad, double done, double cost, const Progress& progress,
+                              FilterCounts& counts) {
+  std::vector<Candidates> candidates;
+  for (size_t c = 0; c < data.components.size(); ++c) candidates.emplace_back(data, pass.candidates(), pilotPad > 0);
+  int first = 0;
+  for (const JointFilterParams& bank : pass.banks) {
+    const double from = done / cost;
+    done += costOf(bank);
+    TileCount count(data, progress, from, done / cost, counts);
+    filterBank(data, features, guides, activity, bank, pass.radius(), first, candidates, count);
+    first += bank.candidates;
+  }
   std::vector<Blend> result;
   for (Candidates& candidate : candidates)
     result.push_back(blendCandidates(data, activity.still, std::move(candidate), level, pilotPad));
@@ -120,7 +147,25 @@ void addPass(std::vector<Blend>& blends, std::vector<Buffer<float>>& sums) {
 
 }  // namespace
 
-std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan) {
+int FilterPass::candidates() const {
+  int sum = 0;
+  for (const JointFilterParams& bank : banks) sum += bank.candidates;
+  return sum;
+}
+
+int FilterPass::radius() const {
+  int largest = 0;
+  for (const JointFilterParams& bank : banks) largest = std::max(largest, bank.radius);
+  return largest;
+}
+
+int FilterPass::guideBorder() const {
+  int largest = 0;
+  for (const JointFilterParams& bank : banks) largest = std::max(largest, bank.radius + bank.patchRadius);
+  return largest;
+}
+
+std::vector<FilterPass> filterPasses(const DenoisePlan& plan) {
   JointFilterParams first;
   first.epsilon *= 4 * plan.level * plan.level;
   first.kColour = {0.45f, 0.7f};
@@ -134,29 +179,27 @@ std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan) {
     first.kColour = {0.6f, 0.6f};
     first.kFeature = {1.0f, 0.7f, 0.7f};
   }
-  if (plan.params.quality != Quality::Best || !plan.inputs.halves) return {first};
+  if (plan.params.quality != Quality::Best || !plan.inputs.halves) return {{{first}}};
   JointFilterParams second = first;
   second.radius = 6;
   second.patchRadius = 2;
   second.kColour = {1.0f, 2.0f};
   second.tau = 0.0007f;
-  return {first, second};
+  return {{{first}}, {{second}}};
 }
 
 std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
-                                         const Activity& activity, std::span<const JointFilterParams> passes,
-                                         float level, const Progress& progress, FilterCounts& counts) {
+                                         const Activity& activity, std::span<const FilterPass> passes, float level,
+                                         const Progress& progress, FilterCounts& counts) {
   const FeatureInput features(data, activity.still);
   std::vector<Buffer<float>> result;
-  double cost = 0, done = 0;  // in candidate pixels of the windows
-  const auto costOf = [](const JointFilterParams& pass) { return double(2 * pass.radius + 1) * (2 * pass.radius + 1); };
-  for (const JointFilterParams& pass : passes) cost += costOf(pass);
+  double cost = 0, done = 0;
+  for (const FilterPass& pass : passes) cost += costOf(pass);
   for (size_t i = 0; i < passes.size(); ++i) {
-    const double from = done / cost;
+    const int pilotPad = i + 1 < passes.size() ? passes[i + 1].guideBorder() : 0;
+    std::vector<Blend> blends =
+        filterOnce(data, features, guides, activity, passes[i], level, pilotPad, done, cost, progress, counts);
     done += costOf(passes[i]);
-    TileCount count(data, progress, from, done / cost, counts);
-    const int pilotPad = i + 1 < passes.size() ? guideBorder(passes[i + 1]) : 0;
-    std::vector<Blend> blends = filterOnce(data, features, guides, activity, passes[i], level, pilotPad, count);
     for (size_t c = 0; c < guides.size() && pilotPad > 0; ++c) {
       copyStill(data, activity.still, guides[c], blends[c].pilot);
       guides[c] = std::move(blends[c].pilot);

@@ -17,15 +17,20 @@
 
 namespace fathom::deep {
 
+// One pass: the candidates of all its banks, in order, go into one selection. Banks differ in what the candidates of one
+// share: windows, patches, tau.
+struct FilterPass {
+  std::vector<JointFilterParams> banks;
+
+  int candidates() const;
+  int radius() const;       // of the largest window
+  int guideBorder() const;  // that the guides need
+};
+
 // The passes of a plan, first to last. A second one needs halves: the variance of the pilot is their difference.
-std::vector<JointFilterParams> filterPasses(const DenoisePlan& plan);
+std::vector<FilterPass> filterPasses(const DenoisePlan& plan);
 
-// The border that the guides of a pass need.
-inline int guideBorder(const JointFilterParams& pass) {
-  return pass.radius + pass.patchRadius;
-}
-
-// What the passes filtered and what they did not; bins count once per component and pass.
+// What the passes filtered and what they did not; bins count once per component and bank.
 struct FilterCounts {
   uint64_t tiles = 0, tilesStill = 0,
            tilesDark = 0;  // all; with nothing noisy; where a component has no light in reach
@@ -35,7 +40,7 @@ struct FilterCounts {
 // Filters every component through the passes. `guides`: one per component, with the border of the first pass. Returns,
 // per component, 3 values per bin. Progress goes from 0 to 1.
 std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
-                                         const Activity& activity, std::span<const JointFilterParams> passes,
-                                         float level, const Progress& progress, FilterCounts& counts);
+                                         const Activity& activity, std::span<const FilterPass> passes, float level,
+                                         const Progress& progress, FilterCounts& counts);
 
 }  // namespace fathom::deep

@@ -1,6 +1,7 @@
 #include "deep/selection.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "deep/still.h"
@@ -37,22 +38,21 @@ bool filteredHalves(const float* sums, std::array<Rgb, 2>& value) {
   return true;
 }
 
-// A candidate that found nothing for a bin takes the next one's value: colour weights find no one where a pixel is not
-// finite, feature weights do.
-void fillFromOthers(const FilterTile& tile, size_t i, int c, size_t bin, std::vector<Buffer<float>>& value) {
-  int known = -1;
-  const auto says = [&](int k) { return tile.at(i, c, k)[3] > kLeastWeight || tile.at(i, c, k)[7] > kLeastWeight; };
-  for (int k = 0; k < tile.candidates; ++k)
-    if (says(k)) known = k;
-  for (int k = 0; k < tile.candidates && known >= 0; ++k)
-    if (!says(k)) std::copy_n(value[size_t(known)].data() + 3 * bin, 3, value[size_t(k)].data() + 3 * bin);
+// A candidate that found nothing for a bin takes the value of the last one that did: colour weights find no one where a
+// pixel is not finite, feature weights do.
+void fillFromOthers(size_t bin, Candidates& candidates) {
+  const unsigned known = candidates.known[bin];
+  if (known == 0) return;
+  const float* value = candidates.value[size_t(std::bit_width(known) - 1)].data() + 3 * bin;
+  for (size_t k = 0; k < candidates.value.size(); ++k)
+    if (!(known >> k & 1)) std::copy_n(value, 3, candidates.value[k].data() + 3 * bin);
 }
 
-// Adds one bin of one candidate; `in` is the bin's noisy data.
-void addBin(const float* in, const float* sums, const float* own, float weight, PixelHalves& pixel, float* out) {
+// Adds one bin of one candidate; `in` is the bin's noisy data. False where the candidate found nothing.
+bool addBin(const float* in, const float* sums, const float* own, float weight, PixelHalves& pixel, float* out) {
   std::array<Rgb, 2> f;
   std::fill_n(out, 3, 0.0f);
-  if (!filteredHalves(sums, f)) return;
+  if (!filteredHalves(sums, f)) return false;
   pixel.alpha += weight;
   for (size_t c = 0; c < 3; ++c) out[c] = 0.5f * (f[0][c] + f[1][c]);
   for (size_t h = 0; h < 2; ++h) {
@@ -64,6 +64,7 @@ void addBin(const float* in, const float* sums, const float* own, float weight, 
     }
     if (sums[4 * h + 3] > kLeastWeight) pixel.share[h] += weight * own[h] / sums[4 * h + 3];
   }
+  return true;
 }
 
 float squaredError(const PixelHalves& pixel) {
@@ -167,7 +168,7 @@ ComponentGuide makePilot(const DenoiseData& data, const Candidates& candidates, 
 
 }  // namespace
 
-Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) {
+Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) : known(data.bins(), 0) {
   const auto zeros = [&] {
     flat::Padded plane(data.width, data.height, std::max(kErrorRadius, kBlendRadius));
     for (int y = 0; y < data.height; ++y) std::fill_n(plane.row(y), data.width, 0.0f);
@@ -185,27 +186,30 @@ Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) 
 }
 
 void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
-                   const FilterTile& tile, int c, const Buffer<uint8_t>& still, Candidates& candidates) {
+                   const FilterTile& tile, int c, int first, const Buffer<uint8_t>& still, Candidates& candidates) {
+  const float parts = float(2 * candidates.value.size());
   size_t i = 0;
   for (int y = tile.box.y0; y < tile.box.y1; ++y) {
     for (int x = tile.box.x0; x < tile.box.x1; ++x) {
       const size_t pixel = size_t(y) * size_t(data.width) + size_t(x);
       const size_t begin = size_t(data.offsets[pixel]), end = size_t(data.offsets[pixel + 1]);
       for (int k = 0; k < tile.candidates && !still[pixel]; ++k) {
+        const size_t candidate = size_t(first + k);
         PixelHalves halves;
-        for (size_t b = begin; b < end; ++b)
-          addBin(component.data.data() + 8 * b, tile.at(i + b - begin, c, k), tile.own(i + b - begin, c, k),
-                 data.weight[b], halves, candidates.value[size_t(k)].data() + 3 * b);
-        candidates.error[size_t(k)].row(y)[x] =
+        for (size_t b = begin; b < end; ++b) {
+          const bool found =
+              addBin(component.data.data() + 8 * b, tile.at(i + b - begin, c, k), tile.own(i + b - begin, c, k),
+                     data.weight[b], halves, candidates.value[candidate].data() + 3 * b);
+          candidates.known[b] = uint8_t(candidates.known[b] | unsigned(found) << candidate);
+        }
+        candidates.error[candidate].row(y)[x] =
             data.halves ? squaredError(halves) : squaredErrorOfWhole(halves, variance, x, y);
         for (size_t h = 0; h < 2 && !candidates.halves.empty(); ++h)
           for (size_t ch = 0; ch < 3; ++ch)
-            candidates.halves[size_t(k)][h].value[ch].row(y)[x] = halves.filtered[h][ch];
+            candidates.halves[candidate][h].value[ch].row(y)[x] = halves.filtered[h][ch];
         for (size_t ch = 0; ch < 3; ++ch)
-          candidates.flattened[ch].row(y)[x] +=
-              (halves.filtered[0][ch] + halves.filtered[1][ch]) / float(2 * tile.candidates);
+          candidates.flattened[ch].row(y)[x] += (halves.filtered[0][ch] + halves.filtered[1][ch]) / parts;
       }
-      for (size_t b = begin; b < end && !still[pixel]; ++b) fillFromOthers(tile, i + b - begin, c, b, candidates.value);
       i += end - begin;
     }
   }
@@ -239,6 +243,7 @@ Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Can
     for (int x = 0; x < data.width; ++x) {
       if (still[size_t(y) * size_t(data.width) + size_t(x)]) continue;
       for (size_t b = size_t(offsets[x]); b < size_t(offsets[x + 1]); ++b) {
+        fillFromOthers(b, candidates);
         for (size_t c = 0; c < 3; ++c) {
           float sum = 0;
           for (size_t k = 0; k < smooth.size(); ++k) sum += smooth[k].row(y)[x] * candidates.value[k][3 * b + c];

@@ -23,6 +23,7 @@ inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
 // What a filter bank made of one component.
 struct Candidates {
   std::vector<Buffer<float>> value;  // [candidate], per bin 3; still pixels' are never set nor read
+  Buffer<uint8_t> known;             // per bin, bit k: candidate k found something for it; 0 also where all are dark
   // [candidate], per pixel: estimated squared error of the flattened value, R + G + B; unbiased, so negative at times.
   std::vector<flat::Padded> error;
   std::vector<flat::Padded> flattened;       // [channel], per pixel: the mean of the candidates
@@ -31,12 +32,13 @@ struct Candidates {
   Candidates(const DenoiseData& data, int candidates, bool wantPilot);
 };
 
-// Adds the sums of one tile, where the component is the c-th that was filtered. Pixels with still[pixel] != 0 are left
-// at 0. `variance`: of the flattened component, used where there are no halves.
+// Adds the sums of one tile, where the component is the c-th that was filtered; its candidates are those from `first`
+// on. Pixels with still[pixel] != 0 are left at 0. `variance`: of the flattened component, used where there are no
+// halves.
 void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
-                   const FilterTile& tile, int c, const Buffer<uint8_t>& still, Candidates& candidates);
+                   const FilterTile& tile, int c, int first, const Buffer<uint8_t>& still, Candidates& candidates);
 
-// The same for a tile where the component has no light: values are 0.
+// The same for a tile where the component has no light: all candidates' values are 0.
 void addDarkness(const DenoiseData& data, const Box& tile, Candidates& candidates);
 
 struct Blend {
