@@ -27,8 +27,9 @@ void addBaseOptions(CLI::App& command, BaseOptions& options) {
 
 std::string describeFilter(const deep::DenoisePlan& plan) {
   const deep::DenoiseInputs& in = plan.inputs;
-  std::string text = fmt::format("quality {} gate {} keep {} level {:a} spp {} inputs", int(plan.params.quality),
-                                 plan.params.gate, plan.params.keepStatistics, plan.level, in.spp);
+  std::string text =
+      fmt::format("filter {} quality {} gate {} keep {} level {:a} spp {} inputs", int(plan.params.filter),
+                  int(plan.params.quality), plan.params.gate, plan.params.keepStatistics, plan.level, in.spp);
   for (const bool flag : {in.components, in.halves, in.halfCounts, in.albedoHalves, in.variance, in.counts, in.albedo,
                           in.albedoVariance, in.normal, in.normalVariance, in.depthVariance, in.volumes})
     text += flag ? " 1" : " 0";

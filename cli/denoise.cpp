@@ -24,6 +24,7 @@ struct DenoiseCommand {
   std::string frames, stats;
   std::string quality = "balanced";
   double budget = 0;  // seconds; 0: none
+  std::string filter = "own";
   std::string missing = "fail";
   bool noGate = false;
   bool keep = false;
@@ -52,11 +53,14 @@ Exit status: 0 all frames done, 1 some failed (one line each), 2 usage, 130 stop
 }
 
 deep::DenoiseParams paramsOf(const DenoiseCommand& command) {
-  using deep::Quality;
+  using deep::FilterKind, deep::Quality;
   const Quality quality = command.quality == "fast"   ? Quality::Fast
                           : command.quality == "best" ? Quality::Best
                                                       : Quality::Balanced;
-  return {quality, !command.noGate, command.keep};
+  const FilterKind filter = command.filter == "paper"  ? FilterKind::Paper
+                            : command.filter == "rdfc" ? FilterKind::Rdfc
+                                                       : FilterKind::Own;
+  return {quality, !command.noGate, command.keep, filter};
 }
 
 // Frames that ought to be there and are not; true where that is a failure.
@@ -136,11 +140,19 @@ void addDenoise(CLI::App& app) {
                                 "fast takes three quarters of the time of balanced, best two and a half times as much")
                              ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
                              ->default_str(command->quality);
+  CLI::Option* filter =
+      option(
+          "--filter", command->filter, "own|paper|rdfc",
+          "Fathom's own filter, or a published one to compare with, without qualities, gate and guide: that of Vicini "
+          "et al., or RDFC, as far as it is known here")
+          ->check(CLI::IsMember({"own", "paper", "rdfc"}).description(""))
+          ->default_str(command->filter);
   option("--time-budget", command->budget, "SECONDS",
          "Choose the quality, and the guide or the base where none is named, for so much work on a frame, reading and "
          "writing aside; once for a sequence, whose outputs record it")
       ->check(CLI::Validator(isTime, ""))
-      ->excludes(quality);
+      ->excludes(quality)
+      ->excludes(filter);
   addBaseOptions(*sub, command->request.base);
   option("--flat-guide", command->request.guide, "auto|nlm|oidn|none|FILE",
          "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of Open Image "
@@ -149,7 +161,7 @@ void addDenoise(CLI::App& app) {
   sub->add_flag("--error", command->request.errors,
                 "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "
                 "flattened ones (three times the work)");
-  sub->add_flag("--no-gate", command->noGate, "The published filter alone, which lets some light bleed between bins");
+  sub->add_flag("--no-gate", command->noGate, "The filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")
       ->check(understood(parseFrames));

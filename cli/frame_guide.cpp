@@ -123,7 +123,7 @@ bool canBeGuided(const deep::DenoiseInputs& inputs) {
 
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t scratch, std::set<std::string>& notes) {
-  if (choice == "none") return {};
+  if (choice == "none" || (choice == "auto" && plan.params.filter != deep::FilterKind::Own)) return {};
   if (!canBeGuided(plan.inputs)) {
     if (choice == "auto") return {};
     fail("{}: expected variance.* or half0.* and half1.* for --flat-guide, found neither", source.path());

@@ -11,7 +11,6 @@
 #include "deep/filter_bank.h"
 #include "deep/flatten.h"
 #include "deep/gate.h"
-#include "deep/selection.h"
 #include "deep/still.h"
 
 namespace fathom::deep {
@@ -120,8 +119,9 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
     mixBins(data, second, activity.still, plan.level, bins);
   }
   clock.lap("mix");
+  const bool gated = plan.params.gate && plan.params.filter == FilterKind::Own;
   const Buffer<flat::GateVerdict> gates =
-      plan.params.gate ? gate(data, bins, activity.still, plan.level) : Buffer<flat::GateVerdict>(data.bins(), {});
+      gated ? gate(data, bins, activity.still, plan.level) : Buffer<flat::GateVerdict>(data.bins(), {});
   clock.lap("gate");
   Buffer<float> colours;
   if (guide) {

@@ -18,6 +18,9 @@ namespace fathom::deep {
 
 enum class Quality { Fast, Balanced, Best };
 
+// Our own filter, or a published one to compare with, which has neither qualities nor a gate (deep/filter_passes).
+enum class FilterKind { Own, Paper, Rdfc };
+
 // What of the channel convention a file offers. Decided once per sequence, so that frames do not differ in method.
 struct DenoiseInputs {
   bool components = false;    // diffuse.* and specular.*; else R G B is the one component
@@ -45,9 +48,10 @@ bool denoiseReads(const DenoiseInputs& inputs, const std::string& channel);
 
 struct DenoiseParams {
   Quality quality = Quality::Balanced;
-  bool gate = true;  // false: the paper's result
+  bool gate = true;
   bool keepStatistics =
       false;  // keep half*, variance* and counts in the output, though they describe the noisy colours
+  FilterKind filter = FilterKind::Own;
 };
 
 struct DenoisePlan {

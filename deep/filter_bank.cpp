@@ -1,8 +1,7 @@
 #include "deep/filter_bank.h"
 
+#include <algorithm>
 #include <mutex>
-
-#include "deep/selection.h"
 
 namespace fathom::deep {
 
@@ -106,7 +105,8 @@ std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& featu
                               float level, int pilotPad, double done, double cost, const Progress& progress,
                               FilterCounts& counts) {
   std::vector<Candidates> candidates;
-  for (size_t c = 0; c < data.components.size(); ++c) candidates.emplace_back(data, pass.candidates(), pilotPad > 0);
+  for (size_t c = 0; c < data.components.size(); ++c)
+    candidates.emplace_back(data, pass.candidates(), pass.selection, pilotPad > 0);
   int first = 0;
   for (const JointFilterParams& bank : pass.banks) {
     const double from = done / cost;
@@ -146,47 +146,6 @@ void addPass(std::vector<Blend>& blends, std::vector<Buffer<float>>& sums) {
 }
 
 }  // namespace
-
-int FilterPass::candidates() const {
-  int sum = 0;
-  for (const JointFilterParams& bank : banks) sum += bank.candidates;
-  return sum;
-}
-
-int FilterPass::radius() const {
-  int largest = 0;
-  for (const JointFilterParams& bank : banks) largest = std::max(largest, bank.radius);
-  return largest;
-}
-
-int FilterPass::guideBorder() const {
-  int largest = 0;
-  for (const JointFilterParams& bank : banks) largest = std::max(largest, bank.radius + bank.patchRadius);
-  return largest;
-}
-
-std::vector<FilterPass> filterPasses(const DenoisePlan& plan) {
-  JointFilterParams first;
-  first.epsilon *= 4 * plan.level * plan.level;
-  first.kColour = {0.45f, 0.7f};
-  first.kFeature = {0.7f, 2.0f, 0.7f};
-  first.crossed = plan.inputs.halves;
-  if (plan.params.quality == Quality::Fast) {
-    first.radius = 3;
-    first.patchRadius = 1;
-    first.candidates = 2;
-    first.colourCandidates = 1;
-    first.kColour = {0.6f, 0.6f};
-    first.kFeature = {1.0f, 0.7f, 0.7f};
-  }
-  if (plan.params.quality != Quality::Best || !plan.inputs.halves) return {{{first}}};
-  JointFilterParams second = first;
-  second.radius = 6;
-  second.patchRadius = 2;
-  second.kColour = {1.0f, 2.0f};
-  second.tau = 0.0007f;
-  return {{{first}}, {{second}}};
-}
 
 std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
                                          const Activity& activity, std::span<const FilterPass> passes, float level,

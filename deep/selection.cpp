@@ -83,7 +83,19 @@ float squaredError(const PixelHalves& pixel) {
   return error;
 }
 
-// The same without halves: the weights do know the noise of what they average, and the estimate is a little too small.
+// Equation 13.
+float squaredErrorByOtherHalf(const PixelHalves& pixel) {
+  if (!(pixel.alpha > 0)) return 0;
+  float error = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    const float r0 = pixel.filtered[0][c] - pixel.noisy[1][c], r1 = pixel.filtered[1][c] - pixel.noisy[0][c];
+    const float e = pixel.noisy[0][c] - pixel.noisy[1][c], d = pixel.filtered[0][c] - pixel.filtered[1][c];
+    error += 0.5f * (r0 * r0 + r1 * r1) - 0.5f * e * e - 0.25f * d * d;
+  }
+  return error;
+}
+
+// Stein's without halves: the weights do know the noise of what they average, and the estimate is a little too small.
 float squaredErrorOfWhole(const PixelHalves& pixel, const GuideVariance& variance, int x, int y) {
   if (!(pixel.alpha > 0)) return 0;
   float error = 0;
@@ -120,8 +132,16 @@ void blur(const DenoiseData& data, std::span<const uint8_t> wantedRows, flat::Pa
   });
 }
 
+// Replaces the errors of a pixel by 1 where they are least and 0 elsewhere.
+void chooseBest(int x, int y, std::vector<flat::Padded>& error) {
+  size_t best = 0;
+  for (size_t k = 1; k < error.size(); ++k)
+    if (error[k].row(y)[x] < error[best].row(y)[x]) best = k;
+  for (size_t k = 0; k < error.size(); ++k) error[k].row(y)[x] = k == best ? 1 : 0;
+}
+
 // Replaces errors by the candidates' parts of the blend, which sum to one.
-void blendWeights(const DenoiseData& data, const Buffer<uint8_t>& wanted, float level,
+void blendWeights(const DenoiseData& data, const Buffer<uint8_t>& wanted, float level, bool best,
                   std::vector<flat::Padded>& error) {
   const float least = 1e-12f * level * level;
   std::vector<uint8_t> rows(size_t(data.height));
@@ -130,6 +150,10 @@ void blendWeights(const DenoiseData& data, const Buffer<uint8_t>& wanted, float 
     rows[size_t(y)] = std::any_of(row, row + data.width, [](uint8_t w) { return w != 0; });
     if (!rows[size_t(y)]) return;
     for (int x = 0; x < data.width; ++x) {
+      if (best) {
+        chooseBest(x, y, error);
+        continue;
+      }
       float worst = 0, sum = 0;
       for (const flat::Padded& e : error) worst = std::max(worst, e.row(y)[x]);
       for (flat::Padded& e : error) {
@@ -168,7 +192,8 @@ ComponentGuide makePilot(const DenoiseData& data, const Candidates& candidates, 
 
 }  // namespace
 
-Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) : known(data.bins(), 0) {
+Candidates::Candidates(const DenoiseData& data, int candidates, const SelectionParams& selection, bool wantPilot)
+    : params(selection), known(data.bins(), 0) {
   const auto zeros = [&] {
     flat::Padded plane(data.width, data.height, std::max(kErrorRadius, kBlendRadius));
     for (int y = 0; y < data.height; ++y) std::fill_n(plane.row(y), data.width, 0.0f);
@@ -187,6 +212,7 @@ Candidates::Candidates(const DenoiseData& data, int candidates, bool wantPilot) 
 
 void addCandidates(const DenoiseData& data, const DenoiseComponent& component, const GuideVariance& variance,
                    const FilterTile& tile, int c, int first, const Buffer<uint8_t>& still, Candidates& candidates) {
+  const bool byOtherHalf = candidates.params.error == ErrorEstimate::OtherHalf;
   const float parts = float(2 * candidates.value.size());
   size_t i = 0;
   for (int y = tile.box.y0; y < tile.box.y1; ++y) {
@@ -202,8 +228,9 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
                      data.weight[b], halves, candidates.value[candidate].data() + 3 * b);
           candidates.known[b] = uint8_t(candidates.known[b] | unsigned(found) << candidate);
         }
-        candidates.error[candidate].row(y)[x] =
-            data.halves ? squaredError(halves) : squaredErrorOfWhole(halves, variance, x, y);
+        candidates.error[candidate].row(y)[x] = !data.halves  ? squaredErrorOfWhole(halves, variance, x, y)
+                                                : byOtherHalf ? squaredErrorByOtherHalf(halves)
+                                                              : squaredError(halves);
         for (size_t h = 0; h < 2 && !candidates.halves.empty(); ++h)
           for (size_t ch = 0; ch < 3; ++ch)
             candidates.halves[candidate][h].value[ch].row(y)[x] = halves.filtered[h][ch];
@@ -237,7 +264,7 @@ Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Can
   Buffer<uint8_t> wanted = allWithin(still, data.width, data.height, kBlendRadius);
   for (uint8_t& w : wanted) w = !w;
   flat::bilateral(data.width, data.height, params, wanted, candidates.flattened, candidates.error, smooth);
-  blendWeights(data, wanted, level, smooth);
+  blendWeights(data, wanted, level, candidates.params.best, smooth);
   parallelFor(0, data.height, [&](int y) {
     const uint64_t* offsets = data.offsets + size_t(y) * size_t(data.width);
     for (int x = 0; x < data.width; ++x) {

@@ -1,6 +1,7 @@
 // Which candidate filter is best where: error estimates of the flattened candidates, and the maps that blend them.
 //
-// Source: Vicini et al., section 4.2, "Color filtering". Three departures, each measured on the shared renders:
+// Source: Vicini et al., section 4.2, "Color filtering". Three departures, each measured on the shared renders (the first
+// and the last only where SelectionParams do not ask for the paper's way):
 // - Equation 13 compares a filtered half with the other half. With crossed weights the filtered half already knows the
 //   other half's noise, and strong colour weights look better than they are. Given weights that do not know it, the filter is
 //   linear in its own half and Stein's estimate needs no derivative of the weights: MSE[F_h] = (F_h - C_h)^2 - (1 - 2
@@ -20,8 +21,16 @@ namespace fathom::deep {
 
 inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
 
-// What a filter bank made of one component.
+enum class ErrorEstimate { Stein, OtherHalf };
+
+struct SelectionParams {
+  ErrorEstimate error = ErrorEstimate::Stein;  // OtherHalf: equation 13; without halves it is Stein's all the same
+  bool best = false;                           // the candidate with the least error alone, by a smoothed map
+};
+
+// What a pass made of one component.
 struct Candidates {
+  SelectionParams params;
   std::vector<Buffer<float>> value;  // [candidate], per bin 3; still pixels' are never set nor read
   Buffer<uint8_t> known;             // per bin, bit k: candidate k found something for it; 0 also where all are dark
   // [candidate], per pixel: estimated squared error of the flattened value, R + G + B; unbiased, so negative at times.
@@ -29,7 +38,7 @@ struct Candidates {
   std::vector<flat::Padded> flattened;       // [channel], per pixel: the mean of the candidates
   std::vector<std::array<Guide, 2>> halves;  // [candidate][half]: flattened; only where a pilot is wanted
 
-  Candidates(const DenoiseData& data, int candidates, bool wantPilot);
+  Candidates(const DenoiseData& data, int candidates, const SelectionParams& params, bool wantPilot);
 };
 
 // Adds the sums of one tile, where the component is the c-th that was filtered; its candidates are those from `first`
