@@ -135,13 +135,17 @@ void copyStill(const DenoiseData& data, const Buffer<uint8_t>& still, const Comp
   }
 }
 
-// Sums of the passes' values, by component.
-void addPass(std::vector<Blend>& blends, std::vector<Buffer<float>>& sums) {
+// Adds to the sums of `before` passes' values, by component. A bin for which a pass found nothing takes the mean of
+// those before it.
+void addPass(std::vector<Blend>& blends, size_t before, std::vector<Buffer<float>>& sums) {
   for (size_t c = 0; c < blends.size(); ++c) {
-    if (sums.size() <= c)
+    if (sums.size() <= c) {
       sums.push_back(std::move(blends[c].value));
-    else
-      for (size_t i = 0; i < sums[c].size(); ++i) sums[c][i] += blends[c].value[i];
+      continue;
+    }
+    const Blend& blend = blends[c];
+    for (size_t i = 0; i < sums[c].size(); ++i)
+      sums[c][i] += blend.known[i / 3] ? blend.value[i] : sums[c][i] / float(before);
   }
 }
 
@@ -163,7 +167,7 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
       copyStill(data, activity.still, guides[c], blends[c].pilot);
       guides[c] = std::move(blends[c].pilot);
     }
-    addPass(blends, result);
+    addPass(blends, i, result);
   }
   for (size_t c = 0; c < result.size() && passes.size() > 1; ++c)
     for (float& value : result[c]) value /= float(passes.size());

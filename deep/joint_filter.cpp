@@ -19,8 +19,8 @@ namespace fathom::deep {
 
 // What one thread needs for one tile.
 struct FilterScratch {
-  static constexpr int kMaxPatch = 2 * 4 + 1;
   static constexpr int kStride = kTileWidth + 32;
+  static_assert(kStride >= kTileWidth + 2 * kMaxPatchRadius + 16);  // whole vectors of up to 16 floats
   Buffer<float> distance[2], across[2];  // per block: per-pixel distances, and their sums along rows
   Buffer<float> colourWeights;           // [component][dx][row][column][candidate][block]
   Buffer<float> centres;                 // [bin][feature channel]: value, variance, 1 / (channels * denominator)

@@ -25,10 +25,11 @@
 namespace fathom::deep {
 
 inline constexpr int kMaxCandidates = 3;
+inline constexpr int kMaxPatchRadius = 4;
 
 struct JointFilterParams {
   int radius = 4;            // of the window: W = 2 radius + 1
-  int patchRadius = 3;       // w = 2 patchRadius + 1
+  int patchRadius = 3;       // 0 to kMaxPatchRadius; w = 2 patchRadius + 1
   int candidates = 3;        // 1 to 3
   int colourCandidates = 2;  // 0 to 2: the first of them have colour weights, the others feature weights alone
   std::array<float, 2> kColour{0.45f, 0.6f};

@@ -279,7 +279,7 @@ Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Can
       }
     }
   });
-  Blend blend{std::move(candidates.value[0]), {}};
+  Blend blend{std::move(candidates.value[0]), std::move(candidates.known), {}};
   if (!candidates.halves.empty()) blend.pilot = makePilot(data, candidates, smooth, pad);
   return blend;
 }

@@ -19,6 +19,7 @@
 
 namespace fathom::deep {
 
+inline constexpr int kMaxPassCandidates = 8;
 inline constexpr int kErrorRadius = 5, kBlendRadius = 5;
 
 enum class ErrorEstimate { Stein, OtherHalf };
@@ -51,7 +52,8 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
 void addDarkness(const DenoiseData& data, const Box& tile, Candidates& candidates);
 
 struct Blend {
-  Buffer<float> value;  // per bin 3
+  Buffer<float> value;    // per bin 3
+  Buffer<uint8_t> known;  // per bin: 0 where no candidate found anything, or all are dark
   // Where wanted, for a second pass: the flattened blend of each half and its two-buffer variance.
   ComponentGuide pilot;
 };

@@ -221,6 +221,24 @@ TEST_F(Denoise, WhatOthersMadeIsRefusedByName) {
   EXPECT_EQ(bytes("out.0001.exr"), "text");
 }
 
+TEST_F(Denoise, AFilterIsASettingOfDeepAndFlatFrames) {
+  writeFrames(1);
+  flat::write(folder_ / "flat.exr", deep::flatten(deep::read(folder_ / "in.0001.exr")));
+  for (const std::string in : {"in.0001.exr", "flat.exr"}) {
+    ASSERT_EQ(run(in + " -o own-" + in).status, 0);
+    EXPECT_EQ(run(in + " -o own-" + in + " --filter own").status, 0);
+    for (const std::string filter : {"paper", "rdfc"}) {
+      EXPECT_EQ(run(in + " -o own-" + in + " --filter " + filter).status, 1) << "not made by " << filter;
+      const std::string out = filter + "-" + in;
+      const Ran outcome = run(in + " -o " + out + " --filter " + filter);
+      EXPECT_EQ(outcome.status, 0) << outcome.err;
+      EXPECT_THAT(outcome.err, Not(HasSubstr("guided")));
+      EXPECT_FALSE(bytes(out) == bytes("own-" + in));
+    }
+    EXPECT_FALSE(bytes("paper-" + in) == bytes("rdfc-" + in));
+  }
+}
+
 TEST_F(Denoise, AKilledRunContinues) {
   writeFrames(6, 60, 60);
   ASSERT_EQ(run("in.####.exr -o whole.####.exr").status, 0);
@@ -347,11 +365,12 @@ TEST_F(Denoise, TheInputIsNeverTheOutput) {
 
 TEST_F(Denoise, UsageErrorsExitWith2) {
   writeFrames(1);
-  for (const char* arguments : {"in.0001.exr", "in.####.exr -o out.exr", "in.0001.exr -o out.####.exr",
-                                "in.0001.exr -o out.png", "in.0001.exr -o out.exr --quality wonderful",
-                                "in.0001.exr -o out.exr --half a.exr", "in.0001.exr -o out.exr --threads 0",
-                                "in.0001.exr -o out.exr --memory lots", "in.0001.exr -o out.exr --frames 1-2",
-                                "in.####.exr -o out.####.exr --frames 2-1", "in.##.##.exr -o out.####.exr"})
+  for (const char* arguments :
+       {"in.0001.exr", "in.####.exr -o out.exr", "in.0001.exr -o out.####.exr", "in.0001.exr -o out.png",
+        "in.0001.exr -o out.exr --quality wonderful", "in.0001.exr -o out.exr --filter bilateral",
+        "in.0001.exr -o out.exr --half a.exr", "in.0001.exr -o out.exr --threads 0",
+        "in.0001.exr -o out.exr --memory lots", "in.0001.exr -o out.exr --frames 1-2",
+        "in.####.exr -o out.####.exr --frames 2-1", "in.##.##.exr -o out.####.exr"})
     EXPECT_EQ(run(arguments).status, 2) << arguments;
   EXPECT_EQ(run("gone.exr -o out.exr").status, 1);
   EXPECT_EQ(run("gone.####.exr -o out.####.exr").status, 1);

@@ -168,6 +168,20 @@ TEST(Denoise, GivesTheSameBitsForAnyBandWhateverIsMissing) {
   }
 }
 
+TEST(Denoise, GivesTheSameBitsForAnyBandAndThreadsWithPublishedFilters) {
+  for (const FilterKind filter : {FilterKind::Paper, FilterKind::Rdfc})
+    for (const bool halves : {true, false}) {
+      DeepImage image = renderFrame({.width = 20, .height = 140, .y0 = -3}).noisy;
+      if (!halves) dropGroup(image, "half");
+      const DenoisePlan plan = planFor(image, {.filter = filter});
+      ASSERT_LT(denoiseHalo(plan), 60);  // else no band is without the others
+      expectBandsAgree(image, plan, 35);
+      const DeepImage expected = denoise(image.copy(), plan);
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+      EXPECT_EQ(difference(expected, denoise(image.copy(), plan)), "");
+    }
+}
+
 TEST(Denoise, GivesTheSameBitsForBandsOfAFrameThatIsMostlyStill) {
   const auto spots = [](int x, int y) { return (x / 5 + y / 5) % 4 == 0 ? 0.8f : 0.0f; };
   const auto lower = [](int, int y) { return y > 40 ? 0.8f : 0.0f; };

@@ -150,8 +150,6 @@ TEST_F(Guided, GuidesOfPiecesAreThatOfTheWhole) {
 TEST(OneBin, TheDeepFilterIsTheFlatOne) {
   const DeepImage deep = reference::renderFrame().noisy;
   const flat::Image flat = flattenNoisy(deep, guidedPlan(deep).inputs);
-  const DenoisePlan flatPlan = planFlat(flat, {});
-  const flat::Image expected = flatNlMeans(flatPlan)(flat, {});
   DeepImage bins{flat.dataWindow, flat.displayWindow, Buffer<uint64_t>(flat.dataWindow.area() + 1), {}, {}};
   for (size_t i = 0; i < bins.offsets.size(); ++i) bins.offsets[i] = i;
   for (const flat::Plane& plane : flat.planes) {
@@ -161,11 +159,16 @@ TEST(OneBin, TheDeepFilterIsTheFlatOne) {
   }
   DenoisePlan plan = guidedPlan(bins);
   plan.guided = false;
-  const DeepImage result = denoise(bins.copy(), plan);
-  for (const char* name : kNames)
-    for (size_t i = 0; i < expected.get(name).values.size(); ++i)
-      ASSERT_NEAR(result.get(name)[i], expected.get(name).values[i],
-                  1e-5 * (1 + std::fabs(expected.get(name).values[i])));
+  for (const FilterKind filter : {FilterKind::Own, FilterKind::Paper, FilterKind::Rdfc}) {
+    plan.params.filter = filter;
+    const flat::Image expected = flatNlMeans(planFlat(flat, {.filter = filter}))(flat, {});
+    const DeepImage result = denoise(bins.copy(), plan);
+    for (const char* name : kNames)
+      for (size_t i = 0; i < expected.get(name).values.size(); ++i)
+        ASSERT_NEAR(result.get(name)[i], expected.get(name).values[i],
+                    1e-5 * (1 + std::fabs(expected.get(name).values[i])))
+            << int(filter);
+  }
 }
 
 }  // namespace
