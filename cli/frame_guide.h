@@ -24,8 +24,8 @@ bool canBeGuided(const deep::DenoiseInputs& inputs);
 // The plan for a choice: auto, nlm, oidn, none (then there is none) or a file. `auto` is Open Image Denoise where it is
 // found and its expected error (flat/sure, on the middle of the first frame, `source`) is smaller than that of our own
 // flat filter; that one else, but only for Quality::Best: it makes the flattened frame as good as any flat one, for two
-// thirds more time. None for Quality::Fast, for published filters, and for frames that say nothing of their noise. Adds to `notes` what it chose.
-// `scratch`: bytes that a library may use. Throws Error where the choice cannot be had.
+// thirds more time. None for Quality::Fast, for published filters, and for frames that say nothing of their noise. Adds
+// to `notes` what it chose. `scratch`: bytes that a library may use. Throws Error where the choice cannot be had.
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t scratch, std::set<std::string>& notes);
 

@@ -368,9 +368,10 @@ TEST_F(Denoise, UsageErrorsExitWith2) {
   for (const char* arguments :
        {"in.0001.exr", "in.####.exr -o out.exr", "in.0001.exr -o out.####.exr", "in.0001.exr -o out.png",
         "in.0001.exr -o out.exr --quality wonderful", "in.0001.exr -o out.exr --filter bilateral",
-        "in.0001.exr -o out.exr --half a.exr", "in.0001.exr -o out.exr --threads 0",
-        "in.0001.exr -o out.exr --memory lots", "in.0001.exr -o out.exr --frames 1-2",
-        "in.####.exr -o out.####.exr --frames 2-1", "in.##.##.exr -o out.####.exr"})
+        "in.0001.exr -o out.exr --filter rdfc --time-budget 1", "in.0001.exr -o out.exr --half a.exr",
+        "in.0001.exr -o out.exr --threads 0", "in.0001.exr -o out.exr --memory lots",
+        "in.0001.exr -o out.exr --frames 1-2", "in.####.exr -o out.####.exr --frames 2-1",
+        "in.##.##.exr -o out.####.exr"})
     EXPECT_EQ(run(arguments).status, 2) << arguments;
   EXPECT_EQ(run("gone.exr -o out.exr").status, 1);
   EXPECT_EQ(run("gone.####.exr -o out.####.exr").status, 1);
