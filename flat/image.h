@@ -33,7 +33,7 @@ struct Image {
   Plane* find(std::string_view name);
   // The plane, or an Error that names it.
   const Plane& get(std::string_view name) const;
-  // Adds a plane of `value`; the name must be new.
+  // Adds a plane of `value`; the name must be new. References to other planes end; their values stay where they are.
   Plane& add(std::string name, float value = 0);
   Image copy() const;
 };
