@@ -33,7 +33,6 @@ class Canvas : public QWidget {
   bool isCurrent() const;
   QSize sizeHint() const override { return {960, 600}; }
 
- public slots:
   void fit();
   void oneToOne() { zoomTo(1); }
   void zoomIn() { zoomTo(2 * zoom()); }

@@ -22,7 +22,6 @@ class ComparePanel : public QWidget {
   // A, B, wipe, side by side, difference, relative error; for a menu. They have no keys.
   QList<QAction*> modeActions() const { return modes_->actions(); }
 
- public slots:
   // A where it is not on the screen, or else B.
   void toggle();
   // Asks for a file.

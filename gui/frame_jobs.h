@@ -26,7 +26,6 @@ class FrameJobs : public QObject {
   // Bytes that denoising may take.
   void setMemory(size_t bytes) { memory_ = bytes; }
 
- public slots:
   // The file of A, as `fathom denoise` does it; the result comes as B.
   void denoiseFrame(fathom::deep::Quality quality = deep::Quality::Balanced);
   // The frames of A from in to out, to files numbered as A is; they come as B. What is there already is kept where these

@@ -64,7 +64,6 @@ class Frames : public QObject {
   // What was made of the file of A by that name comes as B; it stays with its frame.
   void setResult(const std::string& file, const QString& made, PicturePtr picture);
 
- public slots:
   // Files and patterns. What cannot be read is said, and what is on the screen stays.
   void open(const QString& path);
   // Where A is a sequence, so is B, at the same frame numbers. Opens A where there is none.

@@ -22,7 +22,6 @@ class InfoBar : public QWidget {
   QString line() const { return line_.value_or(QString()); }
   QSize sizeHint() const override;
 
- public slots:
   void setZoom(double zoom);
 
  protected:

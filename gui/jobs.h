@@ -36,7 +36,6 @@ class Jobs : public QObject {
   double seconds() const;                                        // since it began
   int waiting() const { return int(waiting_.size()); }
 
- public slots:
   // Stops the one that runs; the next one begins when it has ended.
   void cancel();
   // Stops it, and forgets those that wait.

@@ -18,7 +18,6 @@ class PlacePanel : public QWidget {
  public:
   PlacePanel(Session& session, Placement& placement, QWidget* parent = nullptr);
 
- public slots:
   // Asks for a file.
   void open();
   // Back to where the volume was rendered.

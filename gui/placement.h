@@ -37,7 +37,6 @@ class Placement : public QObject {
   // Until all samples are where they belong.
   bool busy() const { return background_.busy() || rest_.isActive(); }
 
- public slots:
   // A file or a pattern; takes the place of the one before. From now on A and B are shown with it.
   void open(const QString& path);
   // Shows A and B as they are again.

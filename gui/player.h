@@ -37,7 +37,6 @@ class Player : public QObject {
   // One step of the playing: to the next frame if it is ready, and to a stop where there is none.
   void tick();
 
- public slots:
   // The nearest frame there is, whether it is played or not.
   void setFrame(int frame);
   // Within what is played, from its ends to the other one; these stop the playing.

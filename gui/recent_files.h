@@ -14,7 +14,6 @@ class RecentFiles : public QMenu {
 
   QStringList files() const;
 
- public slots:
   void add(const QString& path);
 
  signals:

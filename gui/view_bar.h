@@ -22,7 +22,6 @@ class ViewBar : public QToolBar {
   // All channels, R, G, B, A, luminance: to be shown in a menu, too.
   QList<QAction*> isolateActions() const;
 
- public slots:
   void nextLayer() { stepLayer(1); }
   void previousLayer() { stepLayer(-1); }
   void changeExposure(double stops);
