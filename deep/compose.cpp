@@ -83,6 +83,9 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
           bin.filtered[c] = still[pixel] ? y0 : sum;
           bin.residual[c] = y0 - bin.filtered[c];
           bin.variance[c] = sampleVariance(data, variance, ofPixels, pixel, b, c);
+          // One camera sample alone has no variance; how far it is from what was made of it is one sample of that.
+          if (data.count[b] <= 1 && !(bin.variance[c] > 0) && finite)
+            bin.variance[c] = bin.residual[c] * bin.residual[c];
         }
         bin.samples = data.weight[b] > 0 && finite ? data.count[b] : 0;
         if (!finite) std::fill_n(bin.residual, 3, 0.0f);
