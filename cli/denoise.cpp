@@ -156,7 +156,9 @@ void addDenoise(CLI::App& app) {
   addBaseOptions(*sub, command->request.base);
   option("--flat-guide", command->request.guide, "auto|nlm|oidn|none|FILE",
          "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of Open Image "
-         "Denoise, which also helps with the bins, or in a file; auto takes what promises the least error")
+         "Denoise, which also helps with the bins, or in a file; auto is oidn where that is installed (but for fast), "
+         "else "
+         "nlm for best")
       ->default_str(command->request.guide);
   sub->add_flag("--error", command->request.errors,
                 "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "

@@ -89,9 +89,9 @@ flat::Image middleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
   return flat::crop(input.noisy, {x0, y0, x0 + width, y0 + height});
 }
 
-// Which way of Open Image Denoise, or our own filter.
+// Which way of Open Image Denoise.
 GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, const deep::DenoisePlan& plan,
-                    FrameSource& source, size_t scratch, bool ownToo, std::string& name) {
+                    FrameSource& source, size_t scratch, std::string& name) {
   const flat::Image middle = middleOf(source, plan.inputs);
   GuidePlan best;
   double least = 0;
@@ -104,7 +104,6 @@ GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, con
   };
   consider("oidn with prefiltered guides", oidnGuide(library, true, scratch));
   consider("oidn", oidnGuide(library, false, scratch));
-  if (ownToo) consider("nlm", nlmGuide(plan));
   return best;
 }
 
@@ -134,8 +133,9 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
   const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : findOidn(base.oidnLibrary);
   if (!library) return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
   std::string name;
-  GuidePlan guide = bestGuide(library, plan, source, scratch, choice == "auto", name);
-  notes.insert(fmt::format("{}: bins are guided by {}, which promises the least error", source.path(), name));
+  GuidePlan guide = bestGuide(library, plan, source, scratch, name);
+  notes.insert(
+      fmt::format("{}: bins are guided by {}, which promises less error than the other way", source.path(), name));
   return guide;
 }
 

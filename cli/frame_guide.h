@@ -21,11 +21,13 @@ struct GuidePlan {
 // Whether frames that offer this say enough of their noise to be guided.
 bool canBeGuided(const deep::DenoiseInputs& inputs);
 
-// The plan for a choice: auto, nlm, oidn, none (then there is none) or a file. `auto` is Open Image Denoise where it is
-// found and its expected error (flat/sure, on the middle of the first frame, `source`) is smaller than that of our own
-// flat filter; that one else, but only for Quality::Best: it makes the flattened frame as good as any flat one, for two
-// thirds more time. None for Quality::Fast, for published filters, and for frames that say nothing of their noise. Adds
-// to `notes` what it chose. `scratch`: bytes that a library may use. Throws Error where the choice cannot be had.
+// The plan for a choice: auto, nlm, oidn, none (then there is none) or a file. `oidn` prefilters its own guides where that
+// promises the smaller error (flat/sure, on the middle of the first frame, `source`). `auto` is Open Image Denoise where it
+// is found: bins and pixels take of it what the noisy frame confirms, and gain even where it is worse than our own filter
+// (fur). Where it is not, our own flat filter for Quality::Best alone: it makes the flattened frame as good as any flat
+// one, for two thirds more time. None for Quality::Fast, for published filters and for frames that say nothing of their
+// noise. Adds to `notes` what it chose. `scratch`: bytes that a library may use. Throws Error where the choice cannot be
+// had.
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t scratch, std::set<std::string>& notes);
 
