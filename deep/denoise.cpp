@@ -130,9 +130,10 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   const Buffer<flat::GateVerdict> gates =
       gated ? gate(data, bins, activity.still, plan.level) : Buffer<flat::GateVerdict>(data.bins(), {});
   clock.lap("gate");
-  if (response)
-    *response = noiseResponse(
-        {image, plan.inputs, data, differences, answers, filtered, bins, gates, activity.still});
+  if (response) {
+    *response = noiseResponse({image, plan.inputs, data, differences, answers, filtered, bins, gates, activity.still});
+    clock.lap("error");
+  }
   Buffer<float> colours;
   if (guide) {
     colours = gatedColours(data, bins, gates, activity.still);

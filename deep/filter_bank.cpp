@@ -177,8 +177,8 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
   for (const FilterPass& pass : passes) cost += costOf(pass);
   for (size_t i = 0; i < passes.size(); ++i) {
     const int pilotPad = i + 1 < passes.size() ? passes[i + 1].guideBorder() : 0;
-    std::vector<Blend> blends = filterOnce(data, features, guides, activity, passes[i], level, pilotPad, answers, done,
-                                           cost, progress, counts);
+    std::vector<Blend> blends =
+        filterOnce(data, features, guides, activity, passes[i], level, pilotPad, answers, done, cost, progress, counts);
     done += costOf(passes[i]);
     for (size_t c = 0; c < guides.size() && pilotPad > 0; ++c) {
       copyStill(data, activity.still, guides[c], blends[c].pilot);

@@ -79,7 +79,8 @@ void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, const flat::
 void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, flat::NoiseResponse response, DeepImage& denoised) {
   const flat::Image pixels = pixelsOf(noisy, inputs), result = pixelsOf(denoised, inputs);
   const flat::Noise noise = flat::noiseOf(pixels);
-  addPlanes(flat::errorPlanes(flat::estimateError(pixels, noise, result, std::move(response)), noise, result), denoised);
+  addPlanes(flat::errorPlanes(flat::estimateError(pixels, noise, result, std::move(response)), noise, result),
+            denoised);
 }
 
 }  // namespace fathom::deep

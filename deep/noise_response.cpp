@@ -132,8 +132,8 @@ HalfDifferences halfDifferences(const DeepImage& image, const DenoiseInputs& inp
   HalfDifferences result;
   for (size_t c = 0; c < 3; ++c) {
     const std::string name = flat::kRgbNames[c];
-    result.light[c] = difference(image, inputs.components ? std::vector{"diffuse." + name, "specular." + name}
-                                                          : std::vector{name});
+    result.light[c] =
+        difference(image, inputs.components ? std::vector{"diffuse." + name, "specular." + name} : std::vector{name});
     if (dividesByAlbedo(inputs)) result.albedo[c] = difference(image, std::vector{"albedo." + name});
   }
   for (size_t i = 0; i < image.pixels(); ++i) {
@@ -158,8 +158,8 @@ flat::NoiseResponse noiseResponse(const FilterResult& result) {
         const auto [p0, p1] = partsOf(result.data.components.front().data.data() + 8 * i);
         const float d = result.differences.light[c][i], variance = response.covariance[c][i];
         const float own = ownCovariance(result, parts, i) * variance, spread = 0.25f * own;
-        const float covariance = 0.5f * (own - (p0 - p1) * result.bins[i].residual[c] * d -
-                                         0.5f * filteredDifference(result, c, i) * d);
+        const float covariance =
+            0.5f * (own - (p0 - p1) * result.bins[i].residual[c] * d - 0.5f * filteredDifference(result, c, i) * d);
         const float k = result.gates[i].k;  // F + k (y - F)
         response.covariance[c][i] = covariance + k * (variance - covariance);
         response.spread[c][i] = spread + k * k * (variance - spread);

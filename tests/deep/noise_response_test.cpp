@@ -100,8 +100,8 @@ NoisyFlat withOwnNoise(unsigned seed, int n0, int n1) {
     for (const std::string c : kRgbNames) {
       for (size_t i = 0; i < frame.truth.dataWindow.area(); ++i) {
         const float diffuse = frame.noisy.get(half + c).values[i], specular = other.noisy.get(half + c).values[i];
-        frame.noisy.find(half + "diffuse." + c)->values[i] = diffuse;
-        frame.noisy.find(half + "specular." + c)->values[i] = specular;
+        frame.noisy.find(fmt::format("{}diffuse.{}", half, c))->values[i] = diffuse;
+        frame.noisy.find(fmt::format("{}specular.{}", half, c))->values[i] = specular;
         frame.noisy.find(half + c)->values[i] = diffuse + specular;
       }
       if (!half.empty()) continue;
@@ -121,8 +121,8 @@ void expectUnbiased(int n0, int n1, float gate, bool variances) {
     if (!variances)
       std::erase_if(frame.noisy.planes, [](const flat::Plane& plane) { return plane.name.starts_with("variance."); });
     HandMade made(frame.noisy, gate);
-    const flat::ErrorEstimate estimate = flat::estimateError(frame.noisy, flat::noiseOf(frame.noisy), made.denoised,
-                                                             std::move(made.response));
+    const flat::ErrorEstimate estimate =
+        flat::estimateError(frame.noisy, flat::noiseOf(frame.noisy), made.denoised, std::move(made.response));
     const double d = sum(estimate.error) - squaredError(made.denoised, frame.truth);
     mean += d / kSeeds;
     square += d * d / kSeeds;
@@ -160,10 +160,10 @@ TEST(NoiseResponse, TheAlbedoIsPartOfTheLight) {
   NoisyFlat frame = makeNoisyFlat(40, 30, 1);
   for (const std::string half : {"", "half0.", "half1."})
     for (const std::string c : kRgbNames) {
-      Buffer<float>& albedo = frame.noisy.add(half + "albedo." + c).values;
+      Buffer<float>& albedo = frame.noisy.add(fmt::format("{}albedo.{}", half, c)).values;
       for (size_t i = 0; i < albedo.size(); ++i) {
-        frame.noisy.find(half + "specular." + c)->values[i] = 0;
-        frame.noisy.find(half + "diffuse." + c)->values[i] = frame.noisy.get(half + c).values[i];
+        frame.noisy.find(fmt::format("{}specular.{}", half, c))->values[i] = 0;
+        frame.noisy.find(fmt::format("{}diffuse.{}", half, c))->values[i] = frame.noisy.get(half + c).values[i];
         albedo[i] = std::max(0.0f, 0.8f * frame.noisy.get(half + c).values[i] - kAlbedoOffset);  // even light
       }
     }
@@ -271,8 +271,7 @@ TEST(NoiseResponse, StillDarkAndOddPixels) {
   const flat::Noise noise = flat::noiseOf(frame.noisy);
   const flat::ErrorEstimate probes =
       estimateError(frame.noisy, noise, answer.denoised, flatNlMeans(plan), {.probes = 1});
-  const flat::ErrorEstimate told =
-      estimateError(frame.noisy, noise, answer.denoised, std::move(answer.response));
+  const flat::ErrorEstimate told = estimateError(frame.noisy, noise, answer.denoised, std::move(answer.response));
   for (size_t c = 0; c < 3; ++c)
     for (size_t i = 0; i < frame.noisy.dataWindow.area(); ++i) {
       ASSERT_TRUE(std::isfinite(told.error[c][i]) && std::isfinite(told.spread[c][i])) << i;
