@@ -13,6 +13,7 @@
 #include "cli/frame_source.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
+#include "deep/noise_response.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
 #include "flat/io.h"
@@ -22,10 +23,19 @@ namespace fathom::cli {
 
 namespace {
 
-// The mix has a gate of its own.
-flat::Denoiser baseOf(const ProgressiveRequest& request, const flat::Image& noisy) {
+// The mix of the render and what its base makes of it.
+flat::Image mixOf(const ProgressiveRequest& request, const flat::Image& noisy, const flat::Noise& noise,
+                  const Progress& progress) {
+  // The mix has a gate of its own.
   const deep::DenoisePlan plan = deep::planFlat(noisy, {.quality = request.quality, .gate = false});
-  return makeBase(request.base, plan, request.memory / 2).denoise;
+  if (request.probes == 0 && request.base.name == kOwnBase && deep::tellsResponse(plan)) {
+    deep::FlatAnswer answer = deep::answerNlMeans(noisy, plan, progress);
+    return flat::mixByEstimate(noisy, noise, answer.denoised,
+                               flat::estimateError(noisy, noise, answer.denoised, std::move(answer.response)));
+  }
+  flat::ProgressiveParams params;
+  if (request.probes > 0) params.sure.probes = request.probes;
+  return flat::denoiseProgressively(noisy, makeBase(request.base, plan, request.memory / 2).denoise, params, progress);
 }
 
 // Our own base is decided by the quality and each image.
@@ -141,10 +151,8 @@ class ProgressiveRun {
     }
     flat::Image noisy = read(inputs);
     const flat::Noise noise = flat::noiseOf(noisy);
-    flat::ProgressiveParams params;
-    params.sure.probes = request_.probes;
     const Progress progress{[&](double done) { display_.at(done); }, stop_};
-    flat::Image mixed = flat::denoiseProgressively(noisy, baseOf(request_, noisy), params, progress);
+    flat::Image mixed = mixOf(request_, noisy, noise, progress);
     report.errors = flat::summarizeErrors(mixed, noise);
     report.spp = flat::sppOf(noisy);
     if (standing == Standing::Ours) return;
