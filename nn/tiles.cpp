@@ -13,7 +13,8 @@ namespace fathom::nn {
 
 namespace {
 
-constexpr int kSmallest = 64, kLargest = 512, kStep = 32;
+constexpr int kSmallest = 64, kFair = 256, kLargest = 512, kStep = 32;
+constexpr double kTogether = 8;  // tiles that should fit into the memory at once, as long as they stay fair
 
 double bytesOfTile(const CompositionalNet& net, int side, int components) {
   const double whole = side + 2 * net.halo(components);
@@ -22,7 +23,11 @@ double bytesOfTile(const CompositionalNet& net, int side, int components) {
 
 int tileSide(const CompositionalNet& net, int components, const TileParams& params) {
   int side = kLargest;
-  while (params.memory && side > kSmallest && bytesOfTile(net, side, components) > double(params.memory)) side -= kStep;
+  const auto tooLarge = [&](double tiles) {
+    return params.memory && tiles * bytesOfTile(net, side, components) > double(params.memory);
+  };
+  while (side > kFair && tooLarge(kTogether)) side -= kStep;
+  while (side > kSmallest && tooLarge(1)) side -= kStep;
   return side;
 }
 

@@ -11,8 +11,8 @@
 namespace fathom::nn {
 
 struct TileParams {
-  // What may be held besides the frame and the result; 0: no limit. Where it does not suffice for every thread, fewer
-  // work; where it does not suffice for one, tiles are smaller, but never under 64 pixels a side.
+  // What may be held besides the frame and the result; 0: no limit. Tiles have 512 pixels a side; 256 at least where eight
+  // would not fit at once; and 64 at least where one would not. Where not every thread's tile fits, fewer threads work.
   size_t memory = 0;
 };
 

@@ -17,8 +17,8 @@ using nn::Element;
 using nn::Precision;
 
 constexpr int kRepeats = 5;
-constexpr int kTile = 256;
-constexpr int kFrame = 1024;
+constexpr int kTile = 192;
+constexpr int kFrame = 768;
 constexpr int kComponents[] = {1, 2, 4};
 
 struct Setting {
@@ -137,7 +137,7 @@ Table costs() {
       });
       memory.push_back(double(peakGrowth(cases.back())));
     }
-    const std::vector<double> seconds = interleavedMedians(cases, 3);
+    const std::vector<double> seconds = interleavedMedians(cases, 1);
     for (size_t i = 0; i < cases.size(); ++i) {
       const int k = kComponents[i];
       table.add({setting.name(), double(k), seconds[i] / megapixels, memory[i] * 1e-6 / megapixels,
