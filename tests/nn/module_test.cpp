@@ -24,12 +24,12 @@ void addConv(PlainWeights& weights, const std::string& name, int from, int to, i
 }
 
 std::vector<float> packed(const Volume& volume, Layout layout) {
-  const std::vector<float> values = floatsOf(volume);
+  std::vector<float> values = floatsOf(volume);
   if (layout == Layout::planar) return values;
   const int block = machineBlock(), groups = (volume.channels + block - 1) / block;
   std::vector<float> result(size_t(groups * block * volume.height * volume.width));
-  packPlanes(denseRows(values.data(), volume.channels, volume.height, volume.width), volume.height, volume.width, block,
-             Element::float32, reinterpret_cast<std::byte*>(result.data()));
+  packPlanes(denseRows<const float>(values.data(), volume.channels, volume.height, volume.width), volume.height,
+             volume.width, block, Element::float32, reinterpret_cast<std::byte*>(result.data()));
   return result;
 }
 
