@@ -56,8 +56,9 @@ Volume run(const Module& module, const std::vector<Volume>& inputs, Value wanted
 
 void expectNear(const Volume& found, const Volume& expected) {
   ASSERT_EQ(found.values.size(), expected.values.size());
-  for (size_t i = 0; i < found.values.size(); ++i)
-    ASSERT_NEAR(found.values[i], expected.values[i], 1e-5 * std::max(1.0, std::fabs(expected.values[i]))) << i;
+  double most = 0;
+  for (const double v : expected.values) most = std::max(most, std::fabs(v));
+  for (size_t i = 0; i < found.values.size(); ++i) ASSERT_NEAR(found.values[i], expected.values[i], 3e-6 * most) << i;
 }
 
 struct ConvCase {
