@@ -1,0 +1,268 @@
+// Layers against their twins, and the memory that they share.
+#include "nn/module.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <thread>
+
+#include "nn/compositional_layers.h"
+#include "tests/reference/compositional.h"
+
+namespace fathom::nn {
+namespace {
+
+using reference::PlainWeights;
+using reference::randomVolume;
+using reference::Volume;
+
+void addConv(PlainWeights& weights, const std::string& name, int from, int to, int kernel, uint32_t seed) {
+  const Volume values = randomVolume(to * from, kernel, kernel, seed, -0.3, 0.3);
+  weights.tensors[name + ".weight"] = {{to, from, kernel, kernel}, floatsOf(values)};
+  weights.tensors[name + ".bias"] = {{to}, floatsOf(randomVolume(1, 1, to, seed + 1, -0.5, 0.5))};
+}
+
+std::vector<float> packed(const Volume& volume, Layout layout) {
+  std::vector<float> values = floatsOf(volume);
+  if (layout == Layout::planar) return values;
+  const int block = machineBlock(), groups = (volume.channels + block - 1) / block;
+  std::vector<float> result(size_t(groups * block * volume.height * volume.width));
+  packPlanes(denseRows<const float>(values.data(), volume.channels, volume.height, volume.width), volume.height,
+             volume.width, block, Element::float32, reinterpret_cast<std::byte*>(result.data()));
+  return result;
+}
+
+// Runs a graph in a fresh arena full of NaN, and gives one of its outputs.
+Volume run(const Module& module, const std::vector<Volume>& inputs, Value wanted) {
+  const Graph& graph = module.graph();
+  const auto plan = module.plan(inputs[0].height, inputs[0].width);
+  std::vector<std::vector<float>> values;
+  std::vector<const std::byte*> pointers;
+  for (size_t i = 0; i < inputs.size(); ++i) values.push_back(packed(inputs[i], graph.info(graph.inputs()[i]).layout));
+  for (const auto& v : values) pointers.push_back(reinterpret_cast<const std::byte*>(v.data()));
+  Buffer<std::byte> arena(plan->layout().bytes, std::byte(0xff));
+  plan->run(pointers, arena.data());
+  const Graph::Info& info = graph.info(wanted);
+  const int block = machineBlock();
+  Volume out(info.channels, plan->height() / info.scale, plan->width() / info.scale);
+  const auto* result = reinterpret_cast<const float*>(Plan::result(*plan, arena.data(), wanted));
+  for (int c = 0; c < out.channels; ++c)
+    for (int i = 0; i < out.height * out.width; ++i)
+      out.values[size_t(c * out.height * out.width + i)] =
+          double(result[size_t((c / block * out.height * out.width + i) * block + c % block)]);
+  return out;
+}
+
+void expectNear(const Volume& found, const Volume& expected) {
+  ASSERT_EQ(found.values.size(), expected.values.size());
+  double most = 0;
+  for (const double v : expected.values) most = std::max(most, std::fabs(v));
+  for (size_t i = 0; i < found.values.size(); ++i) ASSERT_NEAR(found.values[i], expected.values[i], 3e-6 * most) << i;
+}
+
+struct ConvCase {
+  int from, to, kernel;
+  Activation activation;
+};
+
+TEST(Module, ConvolutionsEqualTheirTwin) {
+  for (const ConvCase& c : {ConvCase{16, 16, 3, Activation::relu},
+                            {24, 32, 3, Activation::none},
+                            {3, 16, 3, Activation::relu},
+                            {32, 26, 1, Activation::none},
+                            {16, 3, 1, Activation::sigmoid},
+                            {16, 32, 2, Activation::relu},
+                            {48, 16, 1, Activation::relu},
+                            {5, 7, 3, Activation::none}})
+    for (const auto& [height, width] : {std::pair(2, 2), std::pair(6, 10), std::pair(4, 34)})
+      for (const Layout layout : {Layout::blocked, Layout::planar}) {
+        SCOPED_TRACE(
+            fmt::format("{} to {}, {} wide, {}x{}, layout {}", c.from, c.to, c.kernel, height, width, int(layout)));
+        PlainWeights weights;
+        addConv(weights, "c", c.from, c.to, c.kernel, 3);
+        const WeightFile file = readWeights(reference::safetensors(weights), "x");
+        WeightSource source(file);
+        Graph graph;
+        const int stride = c.kernel == 2 ? 2 : 1;
+        const Value in = graph.input(c.from, layout);
+        const Value out = graph.conv(
+            source, "c", in, {.channels = c.to, .kernel = c.kernel, .stride = stride, .activation = c.activation});
+        graph.output(out);
+        const Volume input = randomVolume(c.from, height, width, 5, -2, 2);
+        Volume expected = reference::convolve(weights, "c", input, stride);
+        if (c.activation == Activation::relu) expected = reference::relu(expected);
+        if (c.activation == Activation::sigmoid) expected = reference::sigmoid(expected);
+        const Module module(std::move(graph));
+        expectNear(run(module, {input}, out), expected);
+      }
+}
+
+TEST(Module, SumsConcatenationsAndEnlargementsEqualTheirTwins) {
+  PlainWeights weights;
+  addConv(weights, "down", 16, 32, 2, 1);
+  addConv(weights, "shrink", 32, 16, 1, 2);
+  addConv(weights, "keep", 16, 16, 3, 3);
+  addConv(weights, "merge", 48, 16, 3, 4);
+  addConv(weights, "first", 16, 16, 3, 5);
+  addConv(weights, "second", 16, 16, 3, 6);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  const Conv same = {.channels = 16};
+  const Value in = graph.input(16);
+  const Value down = graph.conv(source, "down", in, {.channels = 32, .kernel = 2, .stride = 2});
+  const Value shrunk =
+      graph.conv(source, "shrink", down, {.channels = 16, .kernel = 1, .activation = Activation::none});
+  // Adds an input, which must stay as it is; then a value that is used again.
+  const Value kept = graph.conv(source, "keep", in, {.channels = 16, .add = in});
+  const Value all = graph.concat({graph.upsample(shrunk), kept, graph.upsample(shrunk)});
+  const Value merged = graph.conv(source, "merge", all, same);
+  const Value first = graph.conv(source, "first", merged, {.channels = 16, .add = merged});
+  const Value second = graph.conv(source, "second", first, {.channels = 16, .add = merged});
+  graph.output(first);
+  graph.output(second);
+  source.finish();
+  const Module module(std::move(graph));
+  for (const auto& [height, width] : {std::pair(2, 2), std::pair(6, 14)}) {
+    const Volume x = randomVolume(16, height, width, 9, -1, 1);
+    const Volume up = reference::upsample(convolve(weights, "shrink", relu(convolve(weights, "down", x, 2))));
+    const Volume keep = relu(plus(convolve(weights, "keep", x), x));
+    const Volume m = relu(convolve(weights, "merge", reference::concat(reference::concat(up, keep), up)));
+    const Volume a = relu(plus(convolve(weights, "first", m), m));
+    const Volume b = relu(plus(convolve(weights, "second", a), m));
+    expectNear(run(module, {x}, first), a);
+    expectNear(run(module, {x}, second), b);
+  }
+}
+
+TEST(Module, PlansAreSharedAndRunAtOnce) {
+  PlainWeights weights;
+  addConv(weights, "c", 16, 16, 3, 1);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  const Value in = graph.input(16), out = graph.conv(source, "c", in, {.channels = 16});
+  graph.output(out);
+  const Module module(std::move(graph));
+  EXPECT_EQ(module.plan(32, 40), module.plan(32, 40));
+  const Volume x = randomVolume(16, 32, 40, 1, -1, 1);
+  const Volume expected = run(module, {x}, out);
+  std::vector<Volume> found(4);
+  {
+    std::vector<std::jthread> threads;
+    for (Volume& f : found) threads.emplace_back([&] { f = run(module, {x}, out); });
+  }
+  for (const Volume& f : found) EXPECT_EQ(f.values, expected.values);
+}
+
+// No two rooms that are taken at the same time overlap, no value leaves its room, and rooms are shared.
+void checkMemory(const Graph& graph, int height, int width) {
+  const ElementSizes sizes = {16, 4};
+  const MemoryPlan plan = planMemory(graph, height, width, sizes, {});
+  size_t rooms = 0, values = 0;
+  for (size_t i = 0; i < plan.rooms.size(); ++i) {
+    const Room& a = plan.rooms[i];
+    rooms += a.bytes;
+    EXPECT_EQ(a.offset % 64, 0U);
+    EXPECT_LE(a.offset + a.bytes, plan.bytes);
+    for (size_t k = 0; k < i; ++k) {
+      const Room& b = plan.rooms[k];
+      const bool together = a.first <= b.last && b.first <= a.last;
+      const bool apart = a.offset + a.bytes <= b.offset || b.offset + b.bytes <= a.offset;
+      EXPECT_TRUE(!together || apart) << "rooms " << k << " and " << i;
+    }
+  }
+  for (size_t v = 0; v < graph.values().size(); ++v) {
+    const Graph::Info& info = graph.values()[v];
+    const MemoryPlan::Place& place = plan.places[v];
+    EXPECT_EQ(place.room < 0, info.input);
+    if (info.input) continue;
+    values += bytesOf(info, sizes, height, width);
+    EXPECT_LE(place.offset + bytesOf(info, sizes, height, width), plan.rooms[size_t(place.room)].bytes);
+  }
+  EXPECT_LT(plan.bytes, rooms);
+  EXPECT_LT(rooms, values);
+  EXPECT_LT(plan.bytes, values / 2);
+}
+
+TEST(MemoryPlan, SharesRoomAndNeverOverlaps) {
+  const WeightFile file = readWeights(reference::safetensors(reference::randomCompositional(16, 1)), "x");
+  WeightSource source(file);
+  checkMemory(decomposeGraph(source, 16).graph, 32, 48);
+  checkMemory(denoiseGraph(source, 16).graph, 32, 48);
+}
+
+// What is live at a layer, by the definition: written before or there, and read there or later.
+TEST(MemoryPlan, LiveValuesNeverLieOnOneAnother) {
+  const WeightFile file = readWeights(reference::safetensors(reference::randomCompositional(16, 1)), "x");
+  WeightSource source(file);
+  const Graph graph = decomposeGraph(source, 16).graph;
+  const ElementSizes sizes = {16, 4};
+  const MemoryPlan plan = planMemory(graph, 16, 16, sizes, {});
+  const auto& layers = graph.layers();
+  const auto livesAfter = [&](Value value, size_t i) {
+    if (graph.info(value).output) return true;
+    for (size_t k = i + 1; k < layers.size(); ++k) {
+      for (const Value& from : layers[k].from)
+        if (from.index == value.index) return true;
+      if (layers[k].conv.add.index == value.index) return true;
+    }
+    return false;
+  };
+  for (size_t i = 0; i < layers.size(); ++i) {
+    if (layers[i].kind == Graph::Kind::concat) continue;  // its parts lie in it
+    const size_t begin = plan.offsetOf(layers[i].to), end = begin + bytesOf(graph.info(layers[i].to), sizes, 16, 16);
+    for (size_t k = 0; k < i; ++k) {
+      const Value other = layers[k].to;
+      const bool read = std::ranges::find(layers[i].from, other.index, &Value::index) != layers[i].from.end();
+      if (!read && !livesAfter(other, i)) continue;
+      const size_t from = plan.offsetOf(other), to = from + bytesOf(graph.info(other), sizes, 16, 16);
+      EXPECT_TRUE(to <= begin || end <= from) << layers[i].name << " writes on " << layers[k].name;
+    }
+  }
+}
+
+TEST(Graph, ReachesAsFarAsItsLayers) {
+  PlainWeights weights;
+  addConv(weights, "a", 16, 16, 3, 1);
+  addConv(weights, "down", 16, 16, 2, 1);
+  addConv(weights, "b", 16, 16, 3, 1);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  const Value in = graph.input(16), unused = graph.input(16);
+  const Value a = graph.conv(source, "a", in, {.channels = 16});
+  const Value down = graph.conv(source, "down", a, {.channels = 16, .kernel = 2, .stride = 2});
+  const Value up = graph.upsample(graph.conv(source, "b", down, {.channels = 16}));
+  EXPECT_EQ(graph.alignment(), 2);
+  EXPECT_EQ(graph.reach({{a.index, {0, 4}}})[0], (Interval{-1, 5}));
+  EXPECT_EQ(graph.reach({{down.index, {0, 2}}})[0], (Interval{-1, 5}));
+  EXPECT_EQ(graph.reach({{up.index, {0, 4}}})[0], (Interval{-3, 7}));
+  EXPECT_EQ(graph.reach({{up.index, {-1, 3}}})[0], (Interval{-5, 7}));
+  EXPECT_EQ(graph.reach({{up.index, {0, 4}}})[size_t(unused.index)], (Interval{0, 0}));
+  EXPECT_DOUBLE_EQ(graph.flopPerPixel(), 2.0 * 16 * 16 * (9 + 4 / 4.0 + 9 / 4.0));
+}
+
+TEST(Graph, RefusesWhatItCannotRun) {
+  PlainWeights weights;
+  addConv(weights, "c", 16, 16, 3, 1);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  const Value in = graph.input(16), other = graph.input(8);
+  EXPECT_THROW(graph.conv(source, "c", in, {.channels = 16, .kernel = 4}), std::logic_error);
+  EXPECT_THROW(graph.conv(source, "c", in, {.channels = 16, .kernel = 3, .stride = 2}), std::logic_error);
+  EXPECT_THROW(graph.conv(source, "c", in, {.channels = 16, .add = other}), std::logic_error);
+  EXPECT_THROW(graph.upsample(in), std::logic_error);
+  EXPECT_THROW(graph.concat({in, other}), std::logic_error);
+  EXPECT_THROW(graph.output(in), std::logic_error);
+  const Value c = graph.conv(source, "c", in, {.channels = 16});
+  graph.concat({c});
+  EXPECT_THROW(graph.concat({c}), std::logic_error);
+  const Module module(std::move(graph));
+  EXPECT_THROW(module.plan(0, 4), std::logic_error);
+}
+
+}  // namespace
+}  // namespace fathom::nn
