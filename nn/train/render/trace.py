@@ -87,7 +87,7 @@ def trace(scene, sampler, camera_ray, max_depth, background):
         eta *= bs.eta
         hit |= first
         last, last_pdf = dr.select(passed, last, mi.Interaction3f(si)), dr.select(passed, last_pdf, bs.pdf)
-        unsampled = passed | delta
+        unsampled = delta  # passing counts too: what is behind a mask is hidden from emitter sampling
         ray = si.spawn_ray(si.to_world(bs.wo))
         depth += dr.select(passed, 0, 1)
         steps += 1
