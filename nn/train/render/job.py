@@ -36,30 +36,37 @@ def folder_of(index, scenes):
 
 
 def probe(scene, camera, look):
-    """Luminance, depth and hits of a few paths over a coarse grid."""
+    """A few paths over a coarse grid: light and depth of each, whether it hit, and how much there is to see: the mean step of the
+    features from pixel to pixel."""
     small = Camera(camera.origin, camera.target, camera.up, camera.fov, camera.width // 4, camera.height // 4)
     v, hit = frames.samples(scene, small, look, 8, 99)
-    return (v[..., 0:3] + v[..., 3:6]).mean(-1), v[..., 12], hit
+    features = v.mean(1)[:, 6:12].reshape(small.height, small.width, 6)
+    detail = sum(np.abs(np.diff(features, axis=k)).mean() for k in (0, 1))
+    return (v[..., 0:3] + v[..., 3:6]).mean(-1), v[..., 12], hit, detail
 
 
 def compose(rng, scene, cameras):
-    """A camera that sees something, focused and exposed, and its Look."""
+    """A camera that sees something, focused and exposed, and its Look: of two to five that will do, the one that sees most."""
     width, height = SIZES[rng.integers(len(SIZES))]
     look = frames.Look(clamp=np.inf, depth=int(rng.integers(4, 11)), background=float(rng.random() < 0.35))
-    for _ in range(8):
+    wanted, found = int(rng.integers(2, 6)), []
+    for _ in range(12):
         camera = Camera(*cameras(rng), width, height)
-        light, z, hit = probe(scene, camera, look)
-        if hit.mean() < 0.45 or np.quantile(z[hit], 0.1) < 0.08 * np.median(z[hit]):
+        light, z, hit, detail = probe(scene, camera, look)
+        if hit.mean() < 0.45 or np.quantile(z[hit], 0.1) < 0.08 * np.median(z[hit]) or (light.mean(1) > 0).mean() < 0.2:
             continue
         level = np.minimum(light, np.quantile(light, 0.98)).mean()
-        if level <= 0 or (light.mean(1) > 0).mean() < 0.1:
-            continue
-        camera.focus = float(np.quantile(z[hit], rng.uniform(0.05, 0.9)))
-        camera.blur = 0.0 if rng.random() < 0.15 else float(np.exp(rng.uniform(np.log(1.5), np.log(20))))
-        look.exposure = float(np.exp(rng.uniform(np.log(0.12), np.log(0.45))) / level)
-        look.clamp = 20.0
-        return camera, look
-    raise Unusable('no camera sees enough')
+        found += [(detail, camera, level, z[hit])] if level > 0 else []
+        if len(found) == wanted:
+            break
+    if not found:
+        raise Unusable('no camera sees enough')
+    _, camera, level, z = max(found, key=lambda f: f[0])
+    camera.focus = float(np.quantile(z, rng.uniform(0.05, 0.9)))
+    camera.blur = 0.0 if rng.random() < 0.15 else float(np.exp(rng.uniform(np.log(1.5), np.log(20))))
+    look.exposure = float(np.exp(rng.uniform(np.log(0.12), np.log(0.45))) / level)
+    look.clamp = 20.0
+    return camera, look
 
 
 def view(rng, scene, cameras, path):
@@ -70,8 +77,9 @@ def view(rng, scene, cameras, path):
     seed = int(rng.integers(1 << 30))
     channels, spp = frames.reference(scene, camera, look, 256, seed, enough=0.003)
     light = (channels['R'] + channels['G'] + channels['B']) / 3
-    if channels['A'].mean() < 0.3 or light.mean() < 0.01:
-        raise Unusable(f'alpha {channels["A"].mean():.2f}, light {light.mean():.3f}')
+    dark = (light < 0.002).mean()
+    if channels['A'].mean() < 0.3 or dark > 0.7:
+        raise Unusable(f'{1 - channels["A"].mean():.2f} of it is empty, {dark:.2f} dark')
     for k, count in enumerate(counts):
         frames.write(f'{path}.{count}.flat.exr', camera, int(count), frames.noisy(scene, camera, look, int(count), seed + 1000 * (k + 1)))
     frames.write(f'{path}.ref.exr', camera, spp, channels)
