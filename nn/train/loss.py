@@ -6,9 +6,11 @@ from model import half_size
 
 EPSILON = 1e-2  # equation 1
 COARSE = (0.1, 0.05)  # weights of the results at half and at quarter size; the paper has only the full size
-# Weight of the mean square of the kernels' logits. Without it, the first steps drive them to where the softmax is flat,
-# the filters stay identities, and nothing is learned (the paper's section 7 knows this of its own training).
-PEAKS = 1e-4
+# Weights of the mean squares of the kernels' logits, and of the features that they are made of. Without the first, a few
+# hundred steps drive logits to where the softmax is flat, the filters stay identities, and nothing is learned (the
+# paper's section 7 knows this of its own training). Without the second, the same push makes the coarse features so large
+# that the fine ones behind them do not count.
+LOGITS, FEATURES = 1e-4, 1e-3
 UNIFORM = 10.0  # weight of the variance of the masks early in training (supplement, section 2.2)
 
 
@@ -22,10 +24,14 @@ def mask_variance(masks):
     return ((masks - 1 / len(masks)) ** 2).mean()
 
 
+def mean_squares(tensors):
+    return sum((x.float() ** 2).mean() for x in tensors)
+
+
 def loss(result, reference, settling):
     """Of `model.Result`: the error at full size, and what is to be minimised."""
     error = smape(result.colours[0], reference)
-    total = error + PEAKS * result.peaks
+    total = error + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
     for colour, weight in zip(result.colours[1:], COARSE):
         reference = half_size(reference)
         total = total + weight * smape(colour, reference)

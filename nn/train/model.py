@@ -23,8 +23,8 @@ RADIUS = 2
 TAPS = (2 * RADIUS + 1) ** 2
 
 # colours: the result at full, half and quarter size; masks: (K, frames, 3, height, width), they sum to 1 over K;
-# peaks: the mean square of the kernels' logits.
-Result = namedtuple("Result", "colours masks peaks")
+# logits: of the kernels, and features: what they are made of, of all scales.
+Result = namedtuple("Result", "colours masks logits features")
 
 
 def convolution(inputs, outputs, size, stride=1, bias=True):
@@ -166,13 +166,13 @@ class Denoise(UNet):
                 layer.weight.mul_(0.1)  # begin with box filters
 
     def forward(self, colour, features):
-        y0, y1, x2 = self.scales(colour, features)
-        logits0, logits1, logits2 = self.kernel0(y0), self.kernel1(y1), self.kernel2(x2)
+        scales = self.scales(colour, features)
+        logits0, logits1, logits2 = (f(x) for f, x in zip((self.kernel0, self.kernel1, self.kernel2), scales))
         colour1 = half_size(colour)
         r2 = filtered(logits2, half_size(colour1))
         r1 = mixed(filtered(logits1[:, :TAPS], colour1), r2, logits1[:, TAPS:])
         r0 = mixed(filtered(logits0[:, :TAPS], colour), r1, logits0[:, TAPS:])
-        return (r0, r1, r2), [logits0[:, :TAPS], logits1[:, :TAPS], logits2]
+        return (r0, r1, r2), (logits0[:, :TAPS], logits1[:, :TAPS], logits2), scales
 
 
 class Encoder(nn.Module):
@@ -208,10 +208,9 @@ class Compositional(nn.Module):
             features = torch.cat([first, second])
             masks = torch.cat([mask * masks, (1 - mask) * masks])
             nodes = torch.cat([mask * nodes, (1 - mask) * nodes])
-        scales, logits = self.denoise(nodes, features)
+        scales, logits, features = self.denoise(nodes, features)
         colours = [x.reshape(components, frames, *x.shape[1:]).sum(0) for x in scales]
-        peaks = sum((x.float() ** 2).mean() for x in logits)
-        return Result(colours, masks.reshape(components, *colour.shape), peaks)
+        return Result(colours, masks.reshape(components, *colour.shape), logits, features)
 
 
 def denoised(model, planes, colour, components):
