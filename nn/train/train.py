@@ -166,18 +166,19 @@ class Training:
         stopped = []
         for kind in (signal.SIGTERM, signal.SIGINT):
             signal.signal(kind, lambda *_: stopped.append(True))
-        begin, hours, saved, work, worked = time.monotonic(), self.hours, time.monotonic(), 0.0, 0.0
+        begin, hours, saved = time.monotonic(), self.hours, time.monotonic()
+        steps, work, worked = 0, 0.0, 0.0
         last = min(self.settings.steps, self.settings.until or self.settings.steps)
         while self.step < last and not stopped:
             started = time.monotonic()
             work += self.train_step()
             now = time.monotonic()
             worked += now - started
+            steps += 1
             self.hours = hours + (now - begin) / 3600
             if self.step % self.settings.validate == 0 or self.step == self.settings.steps:
-                steps = len(self.losses)
                 print(f"{steps / worked:.2f} steps/s, {work / worked:.1f} GFLOP/s", flush=True)
-                work = worked = 0.0
+                steps, work, worked = 0, 0.0, 0.0
                 self.validate()
             if time.monotonic() - saved > 60 * self.settings.minutes:
                 self.save()

@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "nn" / "train"))
 
 from exr import write  # noqa: E402
 
-SPP = 8
+SPP = 4
 
 
 def scene(random, width, height):
