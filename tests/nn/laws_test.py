@@ -208,17 +208,18 @@ class Files(unittest.TestCase):
 
     def test_a_cache_takes_in_what_appears_and_what_is_complete_later(self):
         synthetic.write_frames(self.folder / "frames", scenes=("cards", "fur"), views=1)
-        noisy = self.folder / "frames/cards/view0.8.flat.exr"
+        first, second = f"cards/view0.{synthetic.SPP}", f"cards/view0.{2 * synthetic.SPP}"
+        noisy = self.folder / f"frames/{second}.flat.exr"
         complete = noisy.read_bytes()
         noisy.write_bytes(complete[: len(complete) // 2])
         refused = []
         cache = crops.Cache(self.folder / "cache", [self.folder / "frames"], 32, log=refused.append)
         cache.refresh()
-        self.assertEqual([frame.name for frame in cache.frames], ["cards/view0.16"])
+        self.assertEqual([frame.name for frame in cache.frames], [first])
         self.assertEqual(len(refused), 1)
         noisy.write_bytes(complete)
         cache.refresh()
-        self.assertEqual([frame.name for frame in cache.frames], ["cards/view0.16", "cards/view0.8"])
+        self.assertEqual([frame.name for frame in cache.frames], [first, second])
         stack, targets = cache.frames[0].crop(3, 5, 32)
         whole, _ = crops.prepare(frames.find([self.folder / "frames"])[0], 32)
         np.testing.assert_array_equal(np.concatenate([stack, *targets.values()]), np.float32(whole[:, 3:35, 5:37]))
