@@ -1,0 +1,95 @@
+"""Variations of a crop: exposure, flips, colours, missing features, and which component of the light is denoised.
+
+All that depends on the exposure is computed behind it, by `planes.planes`.
+"""
+
+import numpy as np
+
+from planes import LIGHTS, WHERE, planes
+
+STOPS = 2.0  # the exposure is the rule's times 2^-STOPS to 2^STOPS
+TURNED = 0.5  # share of crops whose normals are turned to other axes of the world
+SHARES = {"diffuse": 0.375, "specular": 0.375, "rgb": 0.25}
+FAINT = 0.01  # a component with less of the light than this teaches nothing
+
+# How often each feature is taken away, with all that is known of its noise.
+MISSING = {
+    ("albedo", "albedo.noise"): 0.1,
+    ("normal", "normal.noise"): 0.1,
+    ("depth", "depth.noise"): 0.1,
+    ("albedo.noise", "normal.noise", "depth.noise"): 0.1,
+    tuple(f"{name}.{what}" for name in LIGHTS for what in ("noise", "root")): 0.1,
+    tuple(f"{name}.halves" for name in LIGHTS): 0.2,
+    ("alpha",): 0.1,
+}
+BARE = 0.05  # share of crops with the colour alone
+
+
+def turned_normals(random, flips, transposed):
+    """An orthogonal map that goes with the turns of the picture, as (axes, signs)."""
+    axes, signs = [0, 1, 2], np.array([-1.0 if flips[1] else 1.0, -1.0 if flips[0] else 1.0, 1.0], np.float32)
+    if transposed:
+        axes, signs = [1, 0, 2], signs[[1, 0, 2]]
+    if random.random() < TURNED:
+        order = random.permutation(3)
+        axes, signs = [axes[i] for i in order], signs[order] * random.choice([-1.0, 1.0], 3).astype(np.float32)
+    return axes, signs
+
+
+def turn(pixels, flips, transposed):
+    """Of (channels, height, width): upside down, left to right, then across the diagonal."""
+    pixels = pixels[:, :: -1 if flips[0] else 1, :: -1 if flips[1] else 1]
+    return pixels.transpose(0, 2, 1) if transposed else pixels
+
+
+def missing(random):
+    gone = set()
+    for names, share in MISSING.items():
+        if random.random() < share:
+            gone.update(names)
+    return set(WHERE) - set(LIGHTS) if random.random() < BARE else gone
+
+
+def chosen_light(random, given, targets):
+    names = [name for name in LIGHTS if name in given]
+    whole = targets["rgb"].mean()
+    names = [name for name in names if name == "rgb" or targets[name].mean() > FAINT * whole]
+    shares = np.array([SHARES[name] for name in names])
+    return names[random.choice(len(names), p=shares / shares.sum())]
+
+
+def varied(random, stack, targets, given, scale):
+    """The planes, the noisy colour and its reference, both times the exposure, of a variation of the crop."""
+    name = chosen_light(random, given, targets)
+    flips, transposed = random.random(2) < 0.5, random.random() < 0.5
+    axes, signs = turned_normals(random, flips, transposed)
+    colours = random.permutation(3)
+    stack = turn(stack, flips, transposed).copy()
+    normal = stack[WHERE["normal"]]
+    stack[WHERE["normal"]] = normal[axes] * signs[:, None, None]
+    for layer in (*LIGHTS, "albedo"):
+        stack[WHERE[layer]] = stack[WHERE[layer]][colours]
+    scale = scale * 2.0 ** random.uniform(-STOPS, STOPS)
+    inputs, colour = planes(stack, given - missing(random), name, scale)
+    target = scale * np.maximum(turn(targets[name], flips, transposed)[colours], 0)
+    return inputs, colour, target.astype(np.float32)
+
+
+class Batches:
+    """Batch number n is the same in every run with the same seed and the same frames."""
+
+    def __init__(self, cache, size, seed):
+        self.cache, self.size, self.seed = cache, size, seed
+
+    def batch(self, step, count):
+        """Planes, colours and references of `count` crops. Scenes are chosen by the root of how many frames they have."""
+        random = np.random.default_rng([self.seed, step])
+        scenes = list(self.cache.scenes().values())
+        shares = np.sqrt([len(scene) for scene in scenes])
+        parts = []
+        for _ in range(count):
+            scene = scenes[random.choice(len(scenes), p=shares / shares.sum())]
+            frame = scene[random.integers(len(scene))]
+            stack, targets = frame.crop(*frame.corner(random, self.size), self.size)
+            parts.append(varied(random, stack, targets, frame.given, frame.exposure))
+        return [np.stack(x) for x in zip(*parts)]

@@ -1,0 +1,48 @@
+"""What training minimises."""
+
+import torch
+
+from model import half_size
+
+EPSILON = 1e-2  # equation 1
+COARSE = (0.1, 0.05)  # weights of the results at half and at quarter size; the paper has only the full size
+# Weights of the mean squares of the kernels' logits, and of the features that they are made of. Without the first, a few
+# hundred steps drive logits to where the softmax is flat, the filters stay identities, and nothing is learned (the
+# paper's section 7 knows this of its own training). Without the second, the same push makes the coarse features so large
+# that the fine ones behind them do not count.
+LOGITS, FEATURES = 1e-4, 1e-3
+UNIFORM = 10.0  # weight of the variance of the masks early in training (supplement, section 2.2)
+
+
+def smape(result, reference):
+    """Equation 1: the symmetric mean absolute percentage error, of colours times the exposure."""
+    return ((reference - result).abs() / (reference.abs() + result.abs() + EPSILON)).mean()
+
+
+def mask_variance(masks):
+    """Equation 2 of the supplement; masks are (K, frames, 3, height, width)."""
+    return ((masks - 1 / len(masks)) ** 2).mean()
+
+
+def mean_squares(tensors):
+    return sum((x.float() ** 2).mean() for x in tensors)
+
+
+def loss(result, reference, settling):
+    """Of `model.Result`: the error at full size, and what is to be minimised."""
+    error = smape(result.colours[0], reference)
+    total = error + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
+    for colour, weight in zip(result.colours[1:], COARSE):
+        reference = half_size(reference)
+        total = total + weight * smape(colour, reference)
+    if settling and len(result.masks) > 1:
+        total = total + UNIFORM * mask_variance(result.masks)
+    return error.detach(), total
+
+
+def schedule(step, steps, warmup):
+    """The share of the learning rate: a linear start, then half a cosine down to a hundredth."""
+    if step < warmup:
+        return (step + 1) / warmup
+    along = min(1.0, (step - warmup) / max(1, steps - warmup))
+    return 0.01 + 0.99 * 0.5 * (1 + float(torch.cos(torch.tensor(torch.pi * along))))

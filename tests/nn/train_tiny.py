@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Trains a small network on procedural frames, in a minute: the whole way from files to weights.
+
+    train_tiny.py FOLDER
+
+Leaves FOLDER/tiny.safetensors and FOLDER/golden.safetensors, which the C++ network is compared with. Exits with 77 where
+there is no PyTorch or no reader of EXR files.
+"""
+
+import csv
+import shutil
+import sys
+from pathlib import Path
+
+try:
+    import numpy as np
+    import torch
+
+    from synthetic import write_frames
+except ImportError as error:
+    print(f"skipped: training, because of {error}")
+    sys.exit(77)
+
+import curve
+import evaluate
+import export
+import golden
+import train
+from frames import find
+from model import COMPONENTS, Compositional
+from weights import load_model, read_tensors
+
+STEPS = 200
+FALL = 0.75  # of the loss, from the first quarter of the steps to the last
+BETTER = 0.9  # of the mean SMAPE of the held-out frames
+
+torch.set_num_threads(1)
+
+
+def trained(out, data, until=STEPS):
+    """Trains up to a step of STEPS, which are what the learning rate follows."""
+    flags = "--width 16 --batch 4 --crop 32 --warmup 20 --settle 10 --validate 50 --rate 2e-3 --threads 1"
+    places = ["--data", str(data), "--out", str(out), "--steps", str(STEPS), "--until", str(until)]
+    train.main([*flags.split(), *places])
+
+
+def same(a, b):
+    """Whether two checkpoints have the same bits, wherever tensors are."""
+    if isinstance(a, torch.Tensor):
+        return torch.equal(a, b)
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a if k != "hours")
+    if isinstance(a, (list, tuple)):
+        return len(a) == len(b) and all(map(same, a, b))
+    return a == b
+
+
+def expect(truth, words):
+    if not truth:
+        sys.exit(f"failed: {words}")
+
+
+def check_training(folder, data):
+    trained(folder / "straight", data)
+    with open(folder / "straight/log.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    first, last = float(rows[0]["loss"]), float(rows[-1]["loss"])
+    expect(last < FALL * first, f"loss: expected less than {FALL} of {first}, found {last}")
+    noisy = {frame.name: evaluate.smape(frame.noisy, frame) for frame in map(evaluate.subject, find([data]))}
+    expect({row["frame"].split("/")[0] for row in rows} == {"coffee"}, "held-out frames: expected those of coffee")
+    limit = BETTER * np.mean([noisy[row["frame"]] for row in rows])
+    for k in COMPONENTS:
+        found = np.mean([float(x["smape"]) for x in rows if x["step"] == str(STEPS) and x["components"] == str(k)])
+        print(f"held-out frames, K = {k}: SMAPE {found:.4f}, noisy {limit / BETTER:.4f}")
+        expect(found < limit, f"held-out frames, K = {k}: expected a SMAPE below {limit:.4f}, found {found:.4f}")
+    caches = [path.read_text() for path in (folder / "straight/cache").glob("*.json")]
+    expect(len(caches) == 8 and not any("coffee" in text for text in caches), "cache: expected 8 frames, none of coffee")
+
+
+def check_resuming(folder, data):
+    for until in (10, 20):
+        trained(folder / "halting", data, until)
+    trained(folder / "whole", data, 20)
+    halting, whole = (torch.load(folder / name / "checkpoint.pt") for name in ("halting", "whole"))
+    expect(same(halting, whole), "a training that was halted: expected the bits of one that was not")
+    expect(not same(halting["model"], halting["average"]), "weights: expected an average that differs from them")
+
+
+def check_weights(folder):
+    export.main([str(folder / "straight"), str(folder / "tiny.safetensors")])
+    tensors, metadata = read_tensors(folder / "tiny.safetensors")
+    expected = {name: tuple(x.shape) for name, x in Compositional(16).state_dict().items()}
+    expect({name: x.shape for name, x in tensors.items()} == expected, "weights: expected the layers of the model")
+    fixed = {"format": "fathom-compositional", "version": "1", "width": "16", "inputs": "24", "steps": str(STEPS)}
+    expect(fixed.items() <= metadata.items(), f"metadata: expected {fixed}, found {metadata}")
+    saved = torch.load(folder / "straight/checkpoint.pt")["average"]
+    expect(same(dict(load_model(folder / "tiny.safetensors").state_dict()), dict(saved)), "weights: expected those of the training")
+    expect("coffee" in (folder / "tiny.md").read_text(), "card: expected the held-out frames")
+
+
+def check_golden(folder):
+    golden.main([str(folder / "tiny.safetensors"), str(folder / "golden.safetensors")])
+    found, _ = read_tensors(folder / "golden.safetensors")
+    shapes = {"input": (24, 24, 40), **{name: (3, 24, 40) for name in ("colour", "output1", "output2", "output4")}}
+    expect({name: x.shape for name, x in found.items()} == shapes, "golden: expected input, colour and three outputs")
+    for k in COMPONENTS:
+        expect(np.abs(found[f"output{k}"] - found["colour"]).mean() > 0.01, f"golden, K = {k}: expected a change")
+
+
+def main():
+    folder = Path(sys.argv[1])
+    shutil.rmtree(folder, ignore_errors=True)
+    write_frames(folder / "frames")
+    check_training(folder, folder / "frames")
+    check_resuming(folder, folder / "frames")
+    check_weights(folder)
+    check_golden(folder)
+    curve.main([str(folder / "straight/log.csv"), str(folder / "curve.svg")])
+    evaluate.main([str(folder / "tiny.safetensors"), str(folder / "frames"), "--out", str(folder / "pictures")])
+
+
+if __name__ == "__main__":
+    main()
