@@ -1,6 +1,8 @@
 // A small deep frame as a renderer would make it, with the same bins free of noise beside it, for tests.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -147,10 +149,10 @@ inline RenderedFrame renderFrame(const FrameParams& p = {}) {
       write(frame.truth, layer + rgb, [](size_t) { return 0.0; });
       write(frame.noisy, layer + rgb, [&](size_t i) { return mean[i][2]; });
       for (size_t h = 0; h < 2; ++h) {
-        const std::string name = "half" + std::to_string(h) + "." + layer + rgb;
+        const std::string name = fmt::format("half{}.{}{}", h, layer, rgb);
         write(frame.noisy, name, [&](size_t i) { return mean[i][h]; });
         float* values = frame.noisy.get(name).data();
-        const auto counts = std::as_const(frame.noisy).get("half" + std::to_string(h) + ".samples");
+        const auto counts = std::as_const(frame.noisy).get(fmt::format("half{}.samples", h));
         for (size_t i = 0; i < bins.size(); ++i)
           if (counts[i] == 0) values[i] = 0;
       }
@@ -163,15 +165,15 @@ inline RenderedFrame renderFrame(const FrameParams& p = {}) {
   for (size_t c = 0; c < 3; ++c) {
     const std::string rgb(1, "RGB"[c]), xyz(1, "XYZ"[c]);
     const auto sum = [&](deep::DeepImage& to, const std::string& half) {
-      const auto d = std::as_const(to).get(half + "diffuse." + rgb),
-                 s = std::as_const(to).get(half + "specular." + rgb);
+      const auto d = std::as_const(to).get(fmt::format("{}diffuse.{}", half, rgb)),
+                 s = std::as_const(to).get(fmt::format("{}specular.{}", half, rgb));
       float* values = plane(to, half + rgb);
       for (size_t i = 0; i < bins.size(); ++i) values[i] = d[i] + s[i];
     };
     sum(frame.truth, "");
     for (const char* half : {"", "half0.", "half1."}) sum(frame.noisy, half);
     for (const char* half : {"", "half0.", "half1."})
-      fill(frame.noisy, std::string(half) + "albedo." + rgb, [&](const auto& b) { return b.alpha * b.albedo[c]; });
+      fill(frame.noisy, fmt::format("{}albedo.{}", half, rgb), [&](const auto& b) { return b.alpha * b.albedo[c]; });
     fill(frame.noisy, "variance.albedo." + rgb, [](const auto&) { return 1e-5f; });
     fill(frame.noisy, "N." + xyz, [&](const auto& b) { return b.alpha * b.normal[c]; });
     fill(frame.noisy, "variance.N." + xyz, [](const auto&) { return 1e-5f; });
