@@ -11,47 +11,6 @@
 
 namespace fathom::cli {
 
-namespace {
-
-// As few bands of as many rows each as that they, with `halo` more rows on both sides, take at most `budget` bytes.
-std::vector<Band> cutBands(FrameSource& source, int halo, size_t budget) {
-  const Box& window = source.part().dataWindow;
-  if (source.decodedBytes(window.y0, window.y1) <= budget) return {{window.y0, window.y1}};
-  std::vector<size_t> upTo = {0};
-  for (int y = window.y0; y < window.y1; ++y) upTo.push_back(upTo.back() + source.decodedBytes(y, y + 1));
-  const auto bytes = [&](const Band& band) {
-    return upTo[size_t(std::min(band.y1 + halo, window.y1) - window.y0)] -
-           upTo[size_t(std::max(band.y0 - halo, window.y0) - window.y0)];
-  };
-  size_t most = 0;
-  for (int height = (window.height() + 1) / 2;; height = (height + 1) / 2) {
-    std::vector<Band> bands;
-    most = 0;
-    for (int y = window.y0; y < window.y1; y += height) {
-      bands.push_back({y, std::min(y + height, window.y1)});
-      most = std::max(most, bytes(bands.back()));
-    }
-    if (most <= budget) return bands;
-    if (height == 1) break;
-  }
-  fail("{}: expected at least {} MB of memory, for a row with the {} around it that decide it; found a limit of {} MB",
-       source.path(), memoryFor(most) / 1'000'000 + 1, 2 * halo, memoryFor(budget) / 1'000'000);
-}
-
-// The frame as one band; its rows take at most `budget` bytes.
-std::vector<Band> wholeFrame(FrameSource& source, size_t budget) {
-  const Box& window = source.part().dataWindow;
-  const size_t bytes = source.decodedBytes(window.y0, window.y1);
-  if (bytes > budget)
-    fail(
-        "{}: expected at least {} MB of memory, for a whole frame, which --base and --error need; found a limit of {} "
-        "MB",
-        source.path(), memoryFor(bytes) / 1'000'000 + 1, memoryFor(budget) / 1'000'000);
-  return {{window.y0, window.y1}};
-}
-
-}  // namespace
-
 std::string describeError(const DenoiseFrame& frame) {
   std::vector<std::string> files = frame.inputs.files();
   for (const std::string& file : frame.outputs.files()) files.push_back(file);
@@ -102,8 +61,8 @@ bool ChunkReader::open() {
   if (isDone(frame.outputs, madeBy)) return false;
 
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
-  const size_t budget = decodedLimit(job_.memory);
-  bands_ = job_.plan.base || job_.plan.errors ? wholeFrame(*source_, budget) : cutBands(*source_, halo_, budget);
+  bands_ = planBands(*source_, job_.plan, halo_, job_.memory);
+  if (bands_.size() > 1) job_.plan.firstImage.reset();
   if (job_.plan.guide && job_.plan.guide->wholeFrame && bands_.size() > 1)
     guide_ = std::make_shared<deep::BaseGuide>(
         readGuide(*source_, bands_.front().y1 - bands_.front().y0, *job_.plan.guide, frame.inputs, job_.plan.denoise));

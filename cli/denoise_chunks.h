@@ -8,13 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "cli/denoise_bands.h"
 #include "cli/denoise_sequence.h"
 
 namespace fathom::cli {
-
-struct Band {
-  int y0, y1;
-};
 
 struct Chunk {
   size_t frame = 0;

@@ -11,6 +11,7 @@
 
 #include "cli/calibration.h"
 #include "cli/denoise_budget.h"
+#include "cli/memory_limit.h"
 #include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
@@ -149,8 +150,7 @@ void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOpt
   const auto first =
       std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
   FrameSource source = openFrame(*first, options, plan);
-  plan.guide =
-      planGuide(guideChoice(request), request.base, plan.denoise, source, decodedLimit(request.memory), plan.notes);
+  plan.guide = planGuide(guideChoice(request), request.base, plan.denoise, source, request.memory, plan.notes);
   plan.denoise.guided = plan.guide.has_value();
 }
 

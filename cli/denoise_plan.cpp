@@ -6,6 +6,7 @@
 #include <cmath>
 #include <exception>
 
+#include "cli/memory_limit.h"
 #include "cli/stopwatch.h"
 #include "deep/alpha.h"
 #include "deep/apply_flat.h"
@@ -18,10 +19,6 @@ namespace fathom::cli {
 
 namespace {
 
-// The program, its libraries, and what the plan itself takes.
-constexpr size_t kProgramBytes = 200'000'000;
-// An image as it is read and in the denoiser's scratch (2), the next one, and the last one as it is written.
-constexpr size_t kImagesInMemory = 4;
 constexpr double kGuidePart = 0.4;  // of the progress on a frame that is guided
 
 // Whether every sample is one camera sample: all have the same part of their pixel, of which most have several. So says
@@ -125,15 +122,6 @@ deep::DeepImage denoiseDeep(deep::DeepImage image, const FrameInputs& inputs, co
 }
 
 }  // namespace
-
-size_t decodedLimit(size_t memory) {
-  return (memory > 2 * kProgramBytes ? memory - kProgramBytes : memory / 2) / kImagesInMemory;
-}
-
-size_t memoryFor(size_t decoded) {
-  const size_t images = decoded * kImagesInMemory;
-  return images + std::min(images, kProgramBytes);
-}
 
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
                           const deep::DenoiseParams& params, const std::string& wanted) {

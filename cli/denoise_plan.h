@@ -15,11 +15,6 @@
 
 namespace fathom::cli {
 
-// How many bytes an image that is denoised may take when it is decoded, so that the run stays within `memory`; and
-// back.
-size_t decodedLimit(size_t memory);
-size_t memoryFor(size_t decoded);
-
 struct SequencePlan {
   deep::DenoisePlan denoise;
   bool deep = true;            // the kind of all frames

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "cli/memory_limit.h"
 #include "deep/flat_nl_means.h"
 #include "flat/error.h"
 #include "flat/io.h"
@@ -16,6 +17,11 @@ namespace {
 
 constexpr int kSampleSide = 384;  // of the middle of the frame that `auto` looks at, pixels
 constexpr int kRowsOfSample = 64;
+
+// Bytes of a pixel, measured: the flattened frame's planes and what our filter, or a library's copies, take beside them;
+// the pictures of bins; and what is left when the guide is made.
+constexpr size_t kFlattenedBytes = 340, kPicturesBytes = 160, kKeptBytes = 112;
+constexpr double kMostOfMemory = 0.75;  // that `auto` lets a guide of whole frames have
 
 // A file that is denoised already, as a denoiser.
 flat::Denoiser fileDenoiser(const std::string& path) {
@@ -107,6 +113,14 @@ GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, con
   return best;
 }
 
+// Whether a guide of whole frames leaves memory for the frame `source` itself.
+bool fits(const GuidePlan& guide, FrameSource& source, size_t memory) {
+  const size_t pixels = source.part().dataWindow.area();
+  const GuideBytes bytes = guideBytes(guide, pixels, memory);
+  const size_t all = pixels * (bytes.madePerPixel + bytes.keptPerPixel) + bytes.library;
+  return double(all) <= kMostOfMemory * double(workingBytes(memory));
+}
+
 // The plan's denoisers, or one that reads the frame's file.
 deep::GuideDenoisers denoisersOf(const GuidePlan& guide, const FrameInputs& inputs) {
   deep::GuideDenoisers denoisers = guide.denoisers;
@@ -120,8 +134,18 @@ bool canBeGuided(const deep::DenoiseInputs& inputs) {
   return inputs.variance || inputs.halves;
 }
 
+GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory) {
+  if (!guide.wholeFrame) return {.madePerPixel = kFlattenedBytes};
+  GuideBytes bytes{kFlattenedBytes, kKeptBytes, 0};
+  if (guide.denoisers.bins) {
+    bytes.madePerPixel += kPicturesBytes;
+    bytes.library = oidnBytes(pixels, memory);
+  }
+  return bytes;
+}
+
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
-                                   FrameSource& source, size_t scratch, std::set<std::string>& notes) {
+                                   FrameSource& source, size_t memory, std::set<std::string>& notes) {
   if (choice == "none" || (choice == "auto" && plan.params.filter != deep::FilterKind::Own)) return {};
   if (!canBeGuided(plan.inputs)) {
     if (choice == "auto") return {};
@@ -131,7 +155,16 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
   if (choice != "auto" && choice != "oidn") return GuidePlan{{}, true, "file"};
   if (choice == "auto" && plan.params.quality == deep::Quality::Fast) return {};
   const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : findOidn(base.oidnLibrary);
-  if (!library) return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
+  const auto without = [&] {
+    return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
+  };
+  if (!library) return without();
+  const size_t scratch = decodedLimit(memory);
+  if (choice == "auto" && !fits(oidnGuide(library, true, scratch), source, memory)) {
+    notes.insert(
+        fmt::format("{}: no guide by Open Image Denoise: whole frames of it take more than the memory", source.path()));
+    return without();
+  }
   std::string name;
   GuidePlan guide = bestGuide(library, plan, source, scratch, name);
   notes.insert(

@@ -18,6 +18,13 @@ struct GuidePlan {
   std::string settings;            // all that decides what it makes, as text to be hashed
 };
 
+// Bytes that a guide takes: of each pixel while it is made, and of each that is kept for bands of the frame; and its library.
+struct GuideBytes {
+  size_t madePerPixel = 0, keptPerPixel = 0, library = 0;
+};
+// For a frame, or a band where those are guided, of so many pixels, in a run that may take `memory` bytes.
+GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory);
+
 // Whether frames that offer this say enough of their noise to be guided.
 bool canBeGuided(const deep::DenoiseInputs& inputs);
 
@@ -26,10 +33,10 @@ bool canBeGuided(const deep::DenoiseInputs& inputs);
 // is found: bins and pixels take of it what the noisy frame confirms, and gain even where it is worse than our own filter
 // (fur). Where it is not, our own flat filter for Quality::Best alone: it makes the flattened frame as good as any flat
 // one, for two thirds more time. None for Quality::Fast, for published filters and for frames that say nothing of their
-// noise. Adds to `notes` what it chose. `scratch`: bytes that a library may use. Throws Error where the choice cannot be
-// had.
+// noise, nor where Open Image Denoise, which takes whole frames, would need more than `memory` bytes for `source`. Adds to
+// `notes` what it chose. Throws Error where the choice cannot be had.
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
-                                   FrameSource& source, size_t scratch, std::set<std::string>& notes);
+                                   FrameSource& source, size_t memory, std::set<std::string>& notes);
 
 // The guide of an image, which for wholeFrame is a whole frame.
 deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, const FrameInputs& inputs,

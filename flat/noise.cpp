@@ -13,6 +13,8 @@ namespace fathom::flat {
 
 namespace {
 
+constexpr float kFewestConverged = 4;  // camera samples
+
 constexpr int kDarkRadius = 2;
 
 // One channel of a half: its own plane, or its components'.
@@ -95,7 +97,7 @@ Noise noiseOf(const Image& image) {
   const int spp = sppOf(image);
   Buffer<uint8_t> dark(pixels);  // black and without variance
   for (size_t i = 0; i < pixels; ++i) {
-    const float count = samples ? samples->values[i] : spp > 0 ? float(spp) : 2;
+    const float count = samples ? samples->values[i] : spp > 0 ? float(spp) : kFewestConverged;
     bool finite = true, still = true, black = true;
     for (size_t c = 0; c < 3; ++c) {
       const float v = noise.variance[c][i];
@@ -104,9 +106,9 @@ Noise noiseOf(const Image& image) {
       black = black && colour[c]->values[i] == 0;
     }
     dark[i] = still && black;
-    noise.pixel[i] = !finite || (still && !(count > 1)) ? PixelNoise::Unknown
-                     : still                            ? PixelNoise::Converged
-                                                        : PixelNoise::Known;
+    noise.pixel[i] = !finite || (still && !(count >= kFewestConverged)) ? PixelNoise::Unknown
+                     : still                                            ? PixelNoise::Converged
+                                                                        : PixelNoise::Known;
     if (isFinite(count) && count > 1 && (samples || spp > 0)) noise.samples[i] = count;
     if (noise.pixel[i] != PixelNoise::Known)
       for (Buffer<float>& plane : noise.variance) plane[i] = 0;

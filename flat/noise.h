@@ -15,8 +15,8 @@ inline constexpr std::array<const char*, 3> kRgbNames{"R", "G", "B"};
 // of a frame lit through a door ajar.)
 enum class PixelNoise : uint8_t {
   Known,
-  Converged,  // variance 0 in all channels, from more than one camera sample: the render is the truth
-  Unknown,    // variance 0 from one camera sample or none, or a colour or variance is not finite
+  Converged,  // variance 0 in all channels, from four camera samples or more: the render is the truth
+  Unknown,    // variance 0 from fewer, or a colour or variance is not finite
 };
 
 // All planes are of the image's data window.

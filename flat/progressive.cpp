@@ -10,6 +10,11 @@ namespace fathom::flat {
 
 namespace {
 
+// How many times too small the variance that so many samples give may be; 1 where their number is not known.
+float doubt(float samples) {
+  return samples > 1 ? (samples + 11) / (samples - 1) : 1;
+}
+
 // How much of the denoised value is taken: equation 9, or all where both are equally good.
 float shareOf(float error, float variance, float covariance) {
   const float all = error + variance - 2 * covariance;
@@ -43,7 +48,9 @@ Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const E
           errors[i] = map.error[c][i];
         } else {
           const float variance = std::max(map.variance[c][i], noise.variance[c][i]);
-          const float share = std::min(shareOf(map.error[c][i], variance, map.covariance[c][i]), 1 - k[i]);
+          const float doubtful = doubt(noise.samples[i]);
+          const float share =
+              std::min(shareOf(map.error[c][i], doubtful * variance, map.covariance[c][i]), 1 - k[i] / doubtful);
           values[i] = share < 1 ? x[i] + share * (y[i] - x[i]) : y[i];
           errors[i] = errorOf(share, map.error[c][i], map.variance[c][i], map.covariance[c][i]);
         }

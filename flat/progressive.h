@@ -7,7 +7,9 @@
 // - The paper gives equation 9 to a network to imitate, since raw SURE is too noisy. Here it is used as it is, with the
 //   error map of flat/error_map in place of SURE: 6 % less error than the denoiser on average and hardly ever more,
 //   where smoothed SURE itself gives 14 % more.
-// - s^2 is the larger of a pixel's own variance and the smoothed one: a firefly knows that it is one.
+// - s^2 is the larger of a pixel's own variance and the smoothed one: a firefly knows that it is one. Times
+//   (n + 11) / (n - 1) for n samples, by which the gate is weakened, too: variances of few samples are poor. From 32 on that
+//   changes nothing; with 2, 4 and 8 the mix was up to 1.33, 1.06 and 1.05 times as wrong as the denoiser without.
 // - The t-statistic gate is not that of equations 12 to 18 but flat/gate, which compares residuals where colours are
 //   alike. The paper's window lets its noisiest pixel decide, and its variance is too small where noise has heavy
 //   tails: it doubled the error of one frame. Convergence has the same reason: the variance of the mean residual falls,

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -111,6 +112,8 @@ void Table::print() const {
 }
 
 void writeText(const std::string& path, const std::string& text) {
+  if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
+    std::filesystem::create_directories(folder);
   std::ofstream out(path);
   out << text;
   if (!out.flush()) fail("{}: cannot be written", path);

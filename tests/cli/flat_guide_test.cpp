@@ -91,13 +91,21 @@ TEST_F(FlatGuide, ANewGuideMakesTheFrameAnew) {
 
 TEST_F(FlatGuide, BandsGiveTheSameBytes) {
   writeGuide("guide.exr", 0);
-  for (const char* guide : {"nlm", "guide.exr"}) {
+  for (const auto& [guide, memory] : {std::pair("nlm", "16M"), std::pair("guide.exr", "24M")}) {
     ASSERT_EQ(run(fmt::format("--flat-guide {}", guide), "whole.exr").status, 0);
-    const Ran bands = run(fmt::format("--flat-guide {} --memory 16M --stats stats.json", guide), "bands.exr");
+    const Ran bands = run(fmt::format("--flat-guide {} --memory {} --stats stats.json", guide, memory), "bands.exr");
     ASSERT_EQ(bands.status, 0) << bands.err;
     EXPECT_THAT(textOf(folder / "stats.json"), Not(HasSubstr("\"bands\": 1,"))) << "the frame was not cut";
     EXPECT_EQ(textOf(folder / "whole.exr"), textOf(folder / "bands.exr")) << guide;
   }
+}
+
+TEST_F(FlatGuide, TooLittleMemoryForAWholeFrameIsOneLine) {
+  writeGuide("guide.exr", 0);
+  const Ran done = run("--flat-guide guide.exr --memory 12M");
+  EXPECT_EQ(done.status, 1);
+  EXPECT_THAT(done.err, HasSubstr("MB of memory, for the guide of the whole frame and a row"));
+  EXPECT_THAT(done.err, HasSubstr("found a limit of 12 MB"));
 }
 
 TEST_F(FlatGuide, NeedsToKnowTheNoise) {
@@ -133,10 +141,20 @@ class WithOidnGuide : public reference::WithOidnInstalled {
 
 TEST_F(WithOidnGuide, BandsAndThreadsGiveTheSameBytes) {
   ASSERT_EQ(run("--flat-guide oidn", "whole.exr").status, 0);
-  const Ran bands = run("--base oidn --memory 16M --threads 1", "bands.exr");
+  const Ran bands = run("--base oidn --memory 42M --stats stats.json --threads 1", "bands.exr");
   ASSERT_EQ(bands.status, 0) << bands.err;
   EXPECT_THAT(bands.err, HasSubstr("bins are guided by oidn"));
+  EXPECT_THAT(textOf(folder / "stats.json"), Not(HasSubstr("\"bands\": 1,"))) << "the frame was not cut";
   EXPECT_EQ(textOf(folder / "whole.exr"), textOf(folder / "bands.exr"));
+}
+
+TEST_F(WithOidnGuide, AutoDoesWithoutWhereTheMemoryIsShort) {
+  ASSERT_EQ(run("--flat-guide none", "none.exr").status, 0);
+  const Ran small = run("--memory 16M", "small.exr");
+  ASSERT_EQ(small.status, 0) << small.err;
+  EXPECT_THAT(small.err, HasSubstr("in.exr: no guide by Open Image Denoise"));
+  EXPECT_EQ(textOf(folder / "none.exr"), textOf(folder / "small.exr"));
+  EXPECT_THAT(run("", "large.exr").err, HasSubstr("bins are guided by oidn"));
 }
 
 }  // namespace

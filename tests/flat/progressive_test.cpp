@@ -59,8 +59,9 @@ TEST(Progressive, MixesByEquation9) {
   for (size_t i = 0; i < pixels; ++i)
     for (size_t c = 0; c < 3; ++c) {
       const double e = double(map.error[c][i]), v = double(map.variance[c][i]), f = double(map.covariance[c][i]);
-      const double s = std::max(v, double(noise.variance[c][i])), all = e + s - 2 * f;
-      const double a = std::min(all > 0 ? std::clamp((s - f) / all, 0.0, 1.0) : 1.0, 1 - double(k[i]));
+      const double n = double(noise.samples[i]), doubt = (n + 11) / (n - 1);
+      const double s = doubt * std::max(v, double(noise.variance[c][i])), all = e + s - 2 * f;
+      const double a = std::min(all > 0 ? std::clamp((s - f) / all, 0.0, 1.0) : 1.0, 1 - double(k[i]) / doubt);
       const double x = double(frame.noisy.get(kRgbNames[c]).values[i]),
                    y = double(denoised.get(kRgbNames[c]).values[i]);
       EXPECT_NEAR(result.get(kRgbNames[c]).values[i], x + a * (y - x), 1e-5) << i;

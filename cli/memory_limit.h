@@ -1,0 +1,35 @@
+// What --memory leaves for the images of a sequence that is denoised.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+namespace fathom::cli {
+
+// An image as it is read and in the denoiser's scratch (2), the next one, and the last one as it is written; with errors to
+// estimate, the noisy one, one that is moved along its noise, and two more as that is denoised.
+inline constexpr size_t kImagesInMemory = 4, kImagesWithErrors = 8;
+// The program, its libraries, and what a plan itself takes.
+inline constexpr size_t kProgramBytes = 200'000'000;
+
+// Bytes that images and guides may take, so that the run stays within `memory`; and back.
+inline size_t workingBytes(size_t memory) {
+  return memory > 2 * kProgramBytes ? memory - kProgramBytes : memory / 2;
+}
+inline size_t memoryFor(size_t working) {
+  return working + std::min(working, kProgramBytes);
+}
+
+// Bytes that one of the images may take when it is decoded.
+inline size_t decodedLimit(size_t memory) {
+  return workingBytes(memory) / kImagesInMemory;
+}
+
+// Bytes that Open Image Denoise takes beside an image, which it works on in tiles where it is told to stay below
+// decodedLimit. Measured.
+inline size_t oidnBytes(size_t pixels, size_t memory) {
+  constexpr size_t kLeast = 400'000'000, kPixel = 700;
+  return std::min(std::max(decodedLimit(memory), kLeast), pixels * kPixel);
+}
+
+}  // namespace fathom::cli
