@@ -13,7 +13,6 @@ namespace fathom::bench {
 namespace {
 
 using nn::CompositionalNet;
-using nn::Element;
 using nn::Precision;
 
 constexpr int kRepeats = 5;

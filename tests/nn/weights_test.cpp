@@ -16,7 +16,6 @@ namespace fathom::nn {
 namespace {
 
 using reference::Bytes;
-using reference::bytesOf;
 using reference::PlainWeights;
 using reference::safetensors;
 using reference::withHeader;
@@ -78,7 +77,7 @@ TEST(Weights, ComeFromAFile) {
 }
 
 TEST(Weights, AreConvertedFromHalves) {
-  const auto read = [](const std::string& dtype, std::vector<uint16_t> bits) {
+  const auto read = [](const std::string& dtype, const std::vector<uint16_t>& bits) {
     Bytes data;
     for (const uint16_t b : bits) {
       data.push_back(std::byte(b & 255));
