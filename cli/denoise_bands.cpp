@@ -55,14 +55,15 @@ std::vector<Band> cutBands(const FrameSource& source, const Rows& rows, int halo
 
 std::vector<Band> planBands(FrameSource& source, const SequencePlan& plan, int halo, size_t memory) {
   const Box& window = source.part().dataWindow;
-  const GuideBytes guide = plan.guide ? guideBytes(*plan.guide, window.area(), memory) : GuideBytes{};
-  const size_t images = plan.errors ? kImagesWithErrors : kImagesInMemory;
-  const size_t library = plan.base ? oidnBytes(window.area(), memory) : guide.library;
+  const GuideBytes guide = plan.guide ? guideBytes(*plan.guide, window.area()) : GuideBytes{};
+  const size_t images = imagesInMemory(plan.errors);
+  const size_t library = plan.base && plan.base->bytes ? plan.base->bytes(window.area()) : guide.library;
   const size_t whole = Rows(source, images, guide.madePerPixel).bytes(window.y0, window.y1) + library;
   if (whole <= workingBytes(memory)) return {{window.y0, window.y1}};
   if (plan.base || plan.errors)
     fail(
-        "{}: expected at least {} MB of memory, for a whole frame, which --base and --error need; found a limit of {} "
+        "{}: expected at least {} MB of memory, for a whole frame, which --method and --error need; found a limit of "
+        "{} "
         "MB",
         source.path(), memoryFor(whole) / 1'000'000 + 1, memory / 1'000'000);
   if (!plan.guide || !plan.guide->wholeFrame)
