@@ -43,7 +43,7 @@ Workload workloadOf(const SequencePlan& plan) {
   const auto pixels = double(std::max<size_t>(plan.pixels, 1));
   const double perPixel = double(plan.samples) / pixels;
   return {pixels * 1e-6, plan.cameraSamples ? std::min(perPixel, kMostClustered) : perPixel,
-          plan.denoise.inputs.components, plan.errors ? 1 + flat::SureParams().probes : 1};
+          plan.denoise.inputs.components, plan.errors ? 1 + flat::SureParams().probes : 1, runsOf(plan)};
 }
 
 // What the outputs say, and the file that says it.

@@ -13,6 +13,7 @@
 #include "deep/channels.h"
 #include "deep/error_estimate.h"
 #include "deep/flat_nl_means.h"
+#include "deep/noise_response.h"
 #include "flat/error.h"
 
 namespace fathom::cli {
@@ -100,9 +101,22 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   return plan;
 }
 
+// A flat frame with its errors, which our own filter tells by itself.
+deep::DeepImage denoiseTelling(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
+                               deep::DenoiseStats* stats) {
+  const deep::DeepImage noisy = image.copy();
+  flat::NoiseResponse response;
+  image = deep::denoise(std::move(image), plan.denoise, progress, stats, nullptr, &response);
+  const Stopwatch watch;
+  deep::addErrors(noisy, plan.denoise.inputs, std::move(response), image);
+  if (stats) stats->seconds["error"] += watch.seconds();
+  return image;
+}
+
 // A flat frame; with its errors, denoising is half of the progress.
 deep::DeepImage denoiseFlat(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
                             deep::DenoiseStats* stats) {
+  if (plan.errors && runsOf(plan) == 1) return denoiseTelling(std::move(image), plan, progress, stats);
   const deep::DeepImage noisy = plan.errors ? image.copy() : deep::DeepImage();
   const double part = plan.errors ? 0.5 : 1;
   const Progress first{[&](double done) { progress.at(part * done); }, progress.stop};
@@ -146,6 +160,11 @@ SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const Sour
   }
   if (first) std::rethrow_exception(first);
   fail("expected a frame to plan from, found none");
+}
+
+int runsOf(const SequencePlan& plan) {
+  const bool tells = !plan.deep && !plan.base && deep::tellsResponse(plan.denoise);
+  return plan.errors && !tells ? 1 + flat::SureParams().probes : 1;
 }
 
 FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, const SequencePlan& plan) {

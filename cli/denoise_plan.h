@@ -36,6 +36,10 @@ struct SequencePlan {
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
                           const deep::DenoiseParams& params, const std::string& wanted);
 
+// Runs of the denoiser that a frame takes: one, and those that measure its errors where these are wanted and the filter
+// does not tell them itself.
+int runsOf(const SequencePlan& plan);
+
 // Opens a frame as the plan has it: what is read, and whether it is clustered.
 FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, const SequencePlan& plan);
 

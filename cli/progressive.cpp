@@ -106,9 +106,11 @@ void addProgressive(CLI::App& app) {
   option("--quality", command->quality, "fast|balanced|best", "Of the denoiser, as in fathom denoise")
       ->check(CLI::IsMember({"fast", "balanced", "best"}).description(""))
       ->default_str(command->quality);
-  option("--probes", request.probes, "N", "Runs of the denoiser that measure its error, beside the first")
-      ->check(CLI::Range(1, 64).description(""))
-      ->default_val(request.probes);
+  option(
+      "--probes", request.probes, "N",
+      "Runs of the denoiser that measure its error, beside the first (default: none for nlm where IN has half buffers, "
+      "which it tells its error by; else 2)")
+      ->check(CLI::Range(1, 64).description(""));
   sub->add_flag("--error", request.errors, "Also write the estimated squared errors as error.{R,G,B}");
   option("--target", command->target, "ERROR", "Say which pass is the first with an estimated relMSE within this")
       ->check(CLI::PositiveNumber.description(""));

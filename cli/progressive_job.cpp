@@ -15,6 +15,7 @@
 #include "cli/method_choice.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
+#include "deep/noise_response.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
 #include "flat/io.h"
@@ -27,6 +28,20 @@ namespace {
 // The mix has a gate of its own.
 deep::DenoisePlan planOf(const ProgressiveRequest& request, const flat::Image& noisy) {
   return deep::planFlat(noisy, {.quality = request.quality, .gate = false});
+}
+
+// The mix of the render and what its base, our own filter where there is none, makes of it.
+flat::Image mixOf(const ProgressiveRequest& request, const std::optional<BaseDenoiser>& base, const flat::Image& noisy,
+                  const flat::Noise& noise, const Progress& progress) {
+  const deep::DenoisePlan plan = planOf(request, noisy);
+  if (request.probes == 0 && !base && deep::tellsResponse(plan)) {
+    deep::FlatAnswer answer = deep::answerNlMeans(noisy, plan, progress);
+    return flat::mixByEstimate(noisy, noise, answer.denoised,
+                               flat::estimateError(noisy, noise, answer.denoised, std::move(answer.response)));
+  }
+  flat::ProgressiveParams params;
+  if (request.probes > 0) params.sure.probes = request.probes;
+  return flat::denoiseProgressively(noisy, base ? base->denoise : deep::flatNlMeans(plan), params, progress);
 }
 
 // What is the base of all images; none: our own filter, which is decided by the quality and each image.
@@ -165,11 +180,8 @@ class ProgressiveRun {
     }
     flat::Image noisy = read(inputs);
     const flat::Noise noise = flat::noiseOf(noisy);
-    flat::ProgressiveParams params;
-    params.sure.probes = request_.probes;
     const Progress progress{[&](double done) { display_.at(done); }, stop_};
-    const flat::Denoiser denoise = base_ ? base_->denoise : makeBase({}, planOf(request_, noisy), 0).denoise;
-    flat::Image mixed = flat::denoiseProgressively(noisy, denoise, params, progress);
+    flat::Image mixed = mixOf(request_, base_, noisy, noise, progress);
     report.errors = flat::summarizeErrors(mixed, noise);
     report.spp = flat::sppOf(noisy);
     if (standing == Standing::Ours) return;

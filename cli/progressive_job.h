@@ -22,7 +22,7 @@ struct ProgressiveRequest {
   std::string map;
   BaseOptions base;
   deep::Quality quality = deep::Quality::Balanced;
-  int probes = 2;
+  int probes = 0;          // 0: none where the base tells its error by itself, else as many as flat::SureParams has
   bool errors = false;     // error.{R,G,B} in the outputs
   bool estimates = false;  // wanted even of outputs that are done
   bool overwrite = false;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "cli/base_denoiser.h"
+
 namespace fathom::cli {
 
 namespace {
@@ -60,7 +62,8 @@ std::vector<SettingCost> costsOf(bool deep, std::span<const std::string> with) {
 double expectedSeconds(const SettingCost& cost, const Workload& workload, double slowness) {
   const double filters = cost.perMegapixel + cost.perMillionBins * workload.binsPerPixel;
   const double perMegapixel = cost.network + filters * (workload.components ? 1 : kOneComponent);
-  return slowness * workload.runs * workload.megapixels * perMegapixel;
+  const bool own = !cost.setting.deep && cost.setting.with == kOwnBase;
+  return slowness * (own ? workload.flatRuns : workload.runs) * workload.megapixels * perMegapixel;
 }
 
 BudgetChoice chooseSetting(std::span<const SettingCost> costs, const Workload& workload, double budget,

@@ -18,6 +18,7 @@ struct Workload {
   double binsPerPixel = 1;  // the mean over all pixels
   bool components = true;   // diffuse and specular are filtered one by one
   int runs = 1;             // of the denoiser: an estimate of its errors takes further ones
+  int flatRuns = 1;         // the same of Fathom's own filter on flat frames, which may tell its errors by itself
 };
 
 // Seconds on the machine of the measurement, frames decoded and with all features.

@@ -38,8 +38,8 @@ void mixBins(const DenoiseData& data, std::span<const float> second, const Buffe
   const float floor = flat::kAlikeFloor * level * level;
   const flat::Reach reach;
   forActiveBins(data, still, [&](int y) {
-    return [&, y, neighbours = flat::MixNeighbours()](int x, size_t b) mutable {
-      neighbours.count = 0;
+    return [&, y](int x, size_t b) {
+      flat::MixNeighbours neighbours;
       forBinNeighbours(data, reach, x, y, b, [&](size_t d, float weight) {
         if (samples[d].samples > 0) neighbours.add(samples[d], weight);
       });

@@ -11,6 +11,7 @@
 #include "deep/filter_bank.h"
 #include "deep/flatten.h"
 #include "deep/gate.h"
+#include "deep/noise_response.h"
 #include "deep/still.h"
 
 namespace fathom::deep {
@@ -81,7 +82,7 @@ void tell(const FilterCounts& counts, double seconds, DenoiseStats& stats) {
 }  // namespace
 
 DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress, DenoiseStats* statsOut,
-                  const BaseGuide* guide) {
+                  const BaseGuide* guide, flat::NoiseResponse* response) {
   DenoiseStats unwanted;
   DenoiseStats& stats = statsOut ? *statsOut : unwanted;
   Clock clock(stats);
@@ -100,6 +101,11 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   int reach = 0;  // of the bank's windows, and a pixel more for gradients
   for (const FilterPass& pass : passes) reach = std::max(reach, pass.radius() + 1);
   prepareFeatures(image, plan.inputs, allWithin(activity.still, data.width, data.height, featureReach(reach)), data);
+  HalfDifferences differences;
+  if (response) {
+    differences = halfDifferences(image, plan.inputs, data);
+    if (plan.inputs.albedo) data.albedo.own = Buffer<float>(data.bins(), 1.0f);
+  }
   dropStatistics(image, plan.params, false);
   clock.lap("prepare");
   prefilterFeatures(data, activity, reach);
@@ -108,8 +114,9 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
 
   FilterCounts counts;
   const Progress filterProgress{[&](double done) { progress.at(0.15 + 0.7 * done); }, progress.stop};
-  std::vector<Buffer<float>> filtered =
-      filterColours(data, std::move(guides), activity, passes, plan.level, filterProgress, counts);
+  std::vector<HalfAnswer> answers;
+  std::vector<Buffer<float>> filtered = filterColours(data, std::move(guides), activity, passes, plan.level,
+                                                      filterProgress, counts, response ? &answers : nullptr);
   tell(counts, clock.lap("filter"), stats);
 
   Buffer<GateBin> bins = compose(image, data, plan.inputs, activity.still, ofPixels, filtered);
@@ -123,6 +130,10 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   const Buffer<flat::GateVerdict> gates =
       gated ? gate(data, bins, activity.still, plan.level) : Buffer<flat::GateVerdict>(data.bins(), {});
   clock.lap("gate");
+  if (response) {
+    *response = noiseResponse({image, plan.inputs, data, differences, answers, filtered, bins, gates, activity.still});
+    clock.lap("error");
+  }
   Buffer<float> colours;
   if (guide) {
     colours = gatedColours(data, bins, gates, activity.still);

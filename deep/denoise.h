@@ -14,6 +14,10 @@
 #include "deep/image.h"
 #include "flat/progress.h"
 
+namespace fathom::flat {
+struct NoiseResponse;
+}
+
 namespace fathom::deep {
 
 enum class Quality { Fast, Balanced, Best };
@@ -75,8 +79,11 @@ struct DenoiseStats {
 
 // Takes an image of tidy bins (sorted, see `isTidy`) that follows DATA.md; returns it with R G B and the components
 // filtered. Alphas, depths, ids and channels it does not know pass unchanged. `guide`: what a flat denoiser says of the
-// same rows (deep/base_guide), where the plan has it. Throws Error (a channel missing) and Cancelled.
+// same rows (deep/base_guide), where the plan has it. `response` gets how the result moves with the noise, without
+// further runs (deep/noise_response); only where the plan tells it, every pixel has one opaque bin, and there is no
+// guide. Throws Error (a channel missing) and Cancelled.
 DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& progress = {},
-                  DenoiseStats* stats = nullptr, const BaseGuide* guide = nullptr);
+                  DenoiseStats* stats = nullptr, const BaseGuide* guide = nullptr,
+                  flat::NoiseResponse* response = nullptr);
 
 }  // namespace fathom::deep

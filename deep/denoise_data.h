@@ -26,6 +26,7 @@ inline constexpr float kLeastShare = 1e-6f;
 // A feature over all bins: up to three channels of values, and the variances of those means.
 struct Feature {
   std::vector<Buffer<float>> value, variance;
+  Buffer<float> own;  // per bin, once prefiltered: its own share of the weights; empty where not wanted
 };
 
 // One of the parts of the light that are filtered apart: effective irradiance, specular light, or the whole colour.

@@ -38,6 +38,7 @@ void takeBlock(const FilterTile& tile, size_t i, size_t bin, int block, Feature&
   const float* sums = tile.at(i, 0, 0) + 4 * block;
   if (!(sums[3] > 0)) return;
   const float share = tile.own(i, 0, 0)[block] / sums[3];
+  if (!feature.own.empty()) feature.own[bin] = share;
   for (size_t c = 0; c < 3; ++c) {
     feature.value[c][bin] = sums[c] / sums[3];
     feature.variance[c][bin] *= share;

@@ -98,15 +98,15 @@ double costOf(const FilterPass& pass) {
   return cost;
 }
 
-// One pass: all candidates for every component, blended; with pilots where pilotPad > 0. `done` and `cost`: of the
-// banks before it, and of all.
+// One pass: all candidates for every component, blended; with pilots where pilotPad > 0, with answers where wanted.
+// `done` and `cost`: of the banks before it, and of all.
 std::vector<Blend> filterOnce(const DenoiseData& data, const FeatureInput& features,
                               std::span<const ComponentGuide> guides, const Activity& activity, const FilterPass& pass,
-                              float level, int pilotPad, double done, double cost, const Progress& progress,
-                              FilterCounts& counts) {
+                              float level, int pilotPad, bool answers, double done, double cost,
+                              const Progress& progress, FilterCounts& counts) {
   std::vector<Candidates> candidates;
   for (size_t c = 0; c < data.components.size(); ++c)
-    candidates.emplace_back(data, pass.candidates(), pass.selection, pilotPad > 0);
+    candidates.emplace_back(data, pass.candidates(), pass.selection, Wanted{pilotPad > 0, answers});
   int first = 0;
   for (const JointFilterParams& bank : pass.banks) {
     const double from = done / cost;
@@ -149,11 +149,28 @@ void addPass(std::vector<Blend>& blends, size_t before, std::vector<Buffer<float
   }
 }
 
+// Takes the answers into the means of those of `before` passes, as addPass does with what was found.
+void addAnswers(std::vector<Blend>& blends, size_t before, std::vector<HalfAnswer>& means) {
+  for (size_t c = 0; c < blends.size(); ++c) {
+    if (before == 0) {
+      means.push_back(std::move(blends[c].answer));
+      continue;
+    }
+    const auto add = [&](const Buffer<float>& from, Buffer<float>& to) {
+      for (size_t i = 0; i < to.size(); ++i)
+        if (blends[c].known[i]) to[i] += (from[i] - to[i]) / float(before + 1);
+    };
+    for (size_t i = 0; i < 3; ++i) add(blends[c].answer.difference[i], means[c].difference[i]);
+    for (size_t h = 0; h < 2; ++h) add(blends[c].answer.share[h], means[c].share[h]);
+  }
+}
+
 }  // namespace
 
 std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
                                          const Activity& activity, std::span<const FilterPass> passes, float level,
-                                         const Progress& progress, FilterCounts& counts) {
+                                         const Progress& progress, FilterCounts& counts,
+                                         std::vector<HalfAnswer>* answers) {
   const FeatureInput features(data, activity.still);
   std::vector<Buffer<float>> result;
   double cost = 0, done = 0;
@@ -161,12 +178,13 @@ std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<Co
   for (size_t i = 0; i < passes.size(); ++i) {
     const int pilotPad = i + 1 < passes.size() ? passes[i + 1].guideBorder() : 0;
     std::vector<Blend> blends =
-        filterOnce(data, features, guides, activity, passes[i], level, pilotPad, done, cost, progress, counts);
+        filterOnce(data, features, guides, activity, passes[i], level, pilotPad, answers, done, cost, progress, counts);
     done += costOf(passes[i]);
     for (size_t c = 0; c < guides.size() && pilotPad > 0; ++c) {
       copyStill(data, activity.still, guides[c], blends[c].pilot);
       guides[c] = std::move(blends[c].pilot);
     }
+    if (answers) addAnswers(blends, i, *answers);
     addPass(blends, i, result);
   }
   for (size_t c = 0; c < result.size() && passes.size() > 1; ++c)

@@ -20,9 +20,11 @@ struct FilterCounts {
 };
 
 // Filters every component through the passes. `guides`: one per component, with the border of the first pass. Returns,
-// per component, 3 values per bin. Progress goes from 0 to 1.
+// per component, 3 values per bin. `answers`, where given, gets what the halves of each component tell; still pixels have
+// 0. Progress goes from 0 to 1.
 std::vector<Buffer<float>> filterColours(const DenoiseData& data, std::vector<ComponentGuide> guides,
                                          const Activity& activity, std::span<const FilterPass> passes, float level,
-                                         const Progress& progress, FilterCounts& counts);
+                                         const Progress& progress, FilterCounts& counts,
+                                         std::vector<HalfAnswer>* answers = nullptr);
 
 }  // namespace fathom::deep

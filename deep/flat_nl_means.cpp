@@ -25,6 +25,21 @@ flat::Image pixelsOf(const DeepImage& image, const DenoiseInputs& inputs) {
   return pixels;
 }
 
+// R, G and B of such bins, which are taken.
+flat::Image coloursOf(DeepImage bins) {
+  flat::Image result{bins.dataWindow, bins.displayWindow, {}, {}};
+  for (const char* name : flat::kRgbNames)
+    result.planes.push_back({name, std::exchange(bins.find(name)->values, Buffer<float>())});
+  return result;
+}
+
+void addPlanes(flat::Image errors, DeepImage& denoised) {
+  for (flat::Plane& plane : errors.planes) {
+    denoised.erase(plane.name);
+    denoised.add(plane.name, PixelType::Float).values = std::move(plane.values);
+  }
+}
+
 }  // namespace
 
 DenoisePlan planFlat(const flat::Image& image, const DenoiseParams& params) {
@@ -46,21 +61,26 @@ DenoisePlan planFlattened(const DenoisePlan& plan) {
 
 flat::Denoiser flatNlMeans(const DenoisePlan& plan) {
   return [plan](const flat::Image& noisy, const Progress& progress) {
-    DeepImage bins = denoise(oneBin(noisy), plan, progress);
-    flat::Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
-    for (const char* name : {"R", "G", "B"})
-      result.planes.push_back({name, std::exchange(bins.find(name)->values, Buffer<float>())});
-    return result;
+    return coloursOf(denoise(oneBin(noisy), plan, progress));
   };
+}
+
+FlatAnswer answerNlMeans(const flat::Image& noisy, const DenoisePlan& plan, const Progress& progress) {
+  FlatAnswer answer;
+  answer.denoised = coloursOf(denoise(oneBin(noisy), plan, progress, nullptr, nullptr, &answer.response));
+  return answer;
 }
 
 void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, const flat::Denoiser& denoiser,
                const Progress& progress, DeepImage& denoised) {
-  flat::Image errors = flat::errorPlanes(pixelsOf(noisy, inputs), pixelsOf(denoised, inputs), denoiser, {}, progress);
-  for (flat::Plane& plane : errors.planes) {
-    denoised.erase(plane.name);
-    denoised.add(plane.name, PixelType::Float).values = std::move(plane.values);
-  }
+  addPlanes(flat::errorPlanes(pixelsOf(noisy, inputs), pixelsOf(denoised, inputs), denoiser, {}, progress), denoised);
+}
+
+void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, flat::NoiseResponse response, DeepImage& denoised) {
+  const flat::Image pixels = pixelsOf(noisy, inputs), result = pixelsOf(denoised, inputs);
+  const flat::Noise noise = flat::noiseOf(pixels);
+  addPlanes(flat::errorPlanes(flat::estimateError(pixels, noise, result, std::move(response)), noise, result),
+            denoised);
 }
 
 }  // namespace fathom::deep

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "deep/denoise.h"
-#include "flat/denoiser.h"
+#include "flat/sure.h"
 
 namespace fathom::deep {
 
@@ -16,9 +16,19 @@ DenoisePlan planFlattened(const DenoisePlan& plan);
 // The denoiser of such a plan.
 flat::Denoiser flatNlMeans(const DenoisePlan& plan);
 
+// What it makes of an image, and how that moves with the noise: for plans that tell the response (deep/noise_response).
+struct FlatAnswer {
+  flat::Image denoised;
+  flat::NoiseResponse response;
+};
+FlatAnswer answerNlMeans(const flat::Image& noisy, const DenoisePlan& plan, const Progress& progress = {});
+
 // Adds error.{R,G,B}, the estimated squared errors of `denoised`, which the denoiser made of `noisy`. Both hold one opaque
 // bin per pixel, as makeOneBin leaves them, and the whole frame.
 void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, const flat::Denoiser& denoiser,
                const Progress& progress, DeepImage& denoised);
+
+// The same with what `denoise` said of the result: no runs.
+void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, flat::NoiseResponse response, DeepImage& denoised);
 
 }  // namespace fathom::deep

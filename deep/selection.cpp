@@ -67,6 +67,12 @@ bool addBin(const float* in, const float* sums, const float* own, float weight, 
   return true;
 }
 
+void keepAnswer(const PixelHalves& halves, size_t pixel, HalfAnswer& answer) {
+  if (!(halves.alpha > 0)) return;
+  for (size_t c = 0; c < 3; ++c) answer.difference[c][pixel] = halves.filtered[0][c] - halves.filtered[1][c];
+  for (size_t h = 0; h < 2; ++h) answer.share[h][pixel] = halves.share[h] / halves.alpha;
+}
+
 float squaredError(const PixelHalves& pixel) {
   if (!(pixel.alpha > 0)) return 0;
   float error = 0;
@@ -190,9 +196,31 @@ ComponentGuide makePilot(const DenoiseData& data, const Candidates& candidates, 
   return pilot;
 }
 
+// A candidate that found nothing for a pixel adds nothing.
+HalfAnswer blendAnswers(const DenoiseData& data, const std::vector<HalfAnswer>& answers,
+                        const std::vector<flat::Padded>& parts) {
+  const size_t width = size_t(data.width);
+  HalfAnswer result(width * size_t(data.height));
+  parallelFor(0, data.height, [&](int y) {
+    const auto add = [&](const Buffer<float>& from, const float* part, Buffer<float>& to) {
+      for (size_t x = 0; x < width; ++x) to[size_t(y) * width + x] += part[x] * from[size_t(y) * width + x];
+    };
+    for (size_t k = 0; k < parts.size(); ++k) {
+      for (size_t c = 0; c < 3; ++c) add(answers[k].difference[c], parts[k].row(y), result.difference[c]);
+      for (size_t h = 0; h < 2; ++h) add(answers[k].share[h], parts[k].row(y), result.share[h]);
+    }
+  });
+  return result;
+}
+
 }  // namespace
 
-Candidates::Candidates(const DenoiseData& data, int candidates, const SelectionParams& selection, bool wantPilot)
+HalfAnswer::HalfAnswer(size_t pixels) {
+  for (Buffer<float>& plane : difference) plane = Buffer<float>(pixels, 0.0f);
+  for (Buffer<float>& plane : share) plane = Buffer<float>(pixels, 0.0f);
+}
+
+Candidates::Candidates(const DenoiseData& data, int candidates, const SelectionParams& selection, Wanted wanted)
     : params(selection), known(data.bins(), 0) {
   const auto zeros = [&] {
     flat::Padded plane(data.width, data.height, std::max(kErrorRadius, kBlendRadius));
@@ -202,7 +230,8 @@ Candidates::Candidates(const DenoiseData& data, int candidates, const SelectionP
   for (int k = 0; k < candidates; ++k) {
     value.emplace_back(data.bins() * 3);
     error.push_back(zeros());
-    if (!wantPilot) continue;
+    if (wanted.answer) answers.emplace_back(size_t(data.width) * size_t(data.height));
+    if (!wanted.pilot) continue;
     std::array<Guide, 2>& guides = halves.emplace_back();
     for (Guide& guide : guides)
       for (flat::Padded& plane : guide.value) plane = zeros();
@@ -234,6 +263,7 @@ void addCandidates(const DenoiseData& data, const DenoiseComponent& component, c
         for (size_t h = 0; h < 2 && !candidates.halves.empty(); ++h)
           for (size_t ch = 0; ch < 3; ++ch)
             candidates.halves[candidate][h].value[ch].row(y)[x] = halves.filtered[h][ch];
+        if (!candidates.answers.empty()) keepAnswer(halves, pixel, candidates.answers[candidate]);
         for (size_t ch = 0; ch < 3; ++ch)
           candidates.flattened[ch].row(y)[x] += (halves.filtered[0][ch] + halves.filtered[1][ch]) / parts;
       }
@@ -279,8 +309,9 @@ Blend blendCandidates(const DenoiseData& data, const Buffer<uint8_t>& still, Can
       }
     }
   });
-  Blend blend{std::move(candidates.value[0]), std::move(candidates.known), {}};
+  Blend blend{std::move(candidates.value[0]), std::move(candidates.known), {}, {}};
   if (!candidates.halves.empty()) blend.pilot = makePilot(data, candidates, smooth, pad);
+  if (!candidates.answers.empty()) blend.answer = blendAnswers(data, candidates.answers, smooth);
   return blend;
 }
 

@@ -29,6 +29,20 @@ struct SelectionParams {
   bool best = false;                           // the candidate with the least error alone, by a smoothed map
 };
 
+// What the halves of the filtered pixels tell of their noise (deep/noise_response).
+struct HalfAnswer {
+  std::array<Buffer<float>, 3> difference;  // half 0 less half 1, flattened
+  std::array<Buffer<float>, 2> share;       // by half, of the sum of weights: that of the pixel itself
+
+  HalfAnswer() = default;
+  explicit HalfAnswer(size_t pixels);  // all 0
+};
+
+// What of the halves is kept.
+struct Wanted {
+  bool pilot = false, answer = false;
+};
+
 // What a pass made of one component.
 struct Candidates {
   SelectionParams params;
@@ -38,8 +52,9 @@ struct Candidates {
   std::vector<flat::Padded> error;
   std::vector<flat::Padded> flattened;       // [channel], per pixel: the mean of the candidates
   std::vector<std::array<Guide, 2>> halves;  // [candidate][half]: flattened; only where a pilot is wanted
+  std::vector<HalfAnswer> answers;           // [candidate]: only where wanted
 
-  Candidates(const DenoiseData& data, int candidates, const SelectionParams& params, bool wantPilot);
+  Candidates(const DenoiseData& data, int candidates, const SelectionParams& params, Wanted wanted = {});
 };
 
 // Adds the sums of one tile, where the component is the c-th that was filtered; its candidates are those from `first`
@@ -56,6 +71,7 @@ struct Blend {
   Buffer<uint8_t> known;  // per bin: 0 where no candidate found anything, or all are dark
   // Where wanted, for a second pass: the flattened blend of each half and its two-buffer variance.
   ComponentGuide pilot;
+  HalfAnswer answer;  // where wanted
 };
 
 // Blends the candidates and takes their storage. `level`: the mean colour of the frame; `pad`: the border of the pilot.

@@ -115,14 +115,18 @@ ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Imag
   return map;
 }
 
-Image errorPlanes(const Image& noisy, const Image& denoised, const Denoiser& denoiser, const SureParams& params,
-                  const Progress& progress) {
-  const Noise noise = noiseOf(noisy);
-  ErrorMap map = mapErrors(estimateError(noisy, noise, denoised, denoiser, params, progress), noise, denoised);
-  Image planes{noisy.dataWindow, noisy.displayWindow, {}, {}};
+Image errorPlanes(const ErrorEstimate& estimate, const Noise& noise, const Image& denoised) {
+  ErrorMap map = mapErrors(estimate, noise, denoised);
+  Image planes{denoised.dataWindow, denoised.displayWindow, {}, {}};
   for (size_t c = 0; c < 3; ++c)
     planes.planes.push_back({std::string("error.") + kRgbNames[c], std::move(map.error[c])});
   return planes;
+}
+
+Image errorPlanes(const Image& noisy, const Image& denoised, const Denoiser& denoiser, const SureParams& params,
+                  const Progress& progress) {
+  const Noise noise = noiseOf(noisy);
+  return errorPlanes(estimateError(noisy, noise, denoised, denoiser, params, progress), noise, denoised);
 }
 
 }  // namespace fathom::flat

@@ -35,8 +35,11 @@ struct ErrorMap {
 ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Image& denoised,
                    const ErrorMapParams& params = {});
 
-// The map as planes error.R, error.G, error.B, for a frame whose denoised R, G and B are at hand. Runs the denoiser
-// once per probe. Throws Error where the frame says nothing of its noise.
+// The map as planes error.R, error.G, error.B.
+Image errorPlanes(const ErrorEstimate& estimate, const Noise& noise, const Image& denoised);
+
+// The same for a frame whose denoised R, G and B are at hand. Runs the denoiser once per probe. Throws Error where the
+// frame says nothing of its noise.
 Image errorPlanes(const Image& noisy, const Image& denoised, const Denoiser& denoiser, const SureParams& params = {},
                   const Progress& progress = {});
 

@@ -61,6 +61,12 @@ Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const E
   return result;
 }
 
+Image mixByEstimate(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorEstimate& estimate,
+                    const ProgressiveParams& params) {
+  const ErrorMap map = mapErrors(estimate, noise, denoised, params.map);
+  return mix(noisy, noise, denoised, map, gate(noisy, noise, denoised, params.gate));
+}
+
 Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params,
                            const Progress& progress) {
   const Noise noise = noiseOf(noisy);
@@ -68,8 +74,7 @@ Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const P
   const Image denoised = denoiser(noisy, {[&](double done) { progress.at(done / runs); }, progress.stop});
   const Progress rest{[&](double done) { progress.at((1 + done * (runs - 1)) / runs); }, progress.stop};
   const ErrorEstimate estimate = estimateError(noisy, noise, denoised, denoiser, params.sure, rest);
-  const ErrorMap map = mapErrors(estimate, noise, denoised, params.map);
-  return mix(noisy, noise, denoised, map, gate(noisy, noise, denoised, params.gate));
+  return mixByEstimate(noisy, noise, denoised, estimate, params);
 }
 
 }  // namespace fathom::flat

@@ -33,6 +33,10 @@ struct ProgressiveParams {
 // finite, stands the denoised value (0 where that is not finite either).
 Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorMap& map, const Buffer<float>& k);
 
+// The last steps, with what was estimated of `denoised`.
+Image mixByEstimate(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorEstimate& estimate,
+                    const ProgressiveParams& params = {});
+
 // All steps, for a render that says something of its noise (see noiseOf): 1 + probes runs of the denoiser.
 Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params = {},
                            const Progress& progress = {});

@@ -1,6 +1,7 @@
 #include "flat/sure.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "flat/error.h"
 #include "flat/finite.h"
@@ -32,6 +33,7 @@ void addProbe(const Image& noisy, const Image& denoised, const Image& moved, con
   }
 }
 
+// The error from covariance and spread, which are sums over so many probes.
 void finish(const Image& noisy, const Noise& noise, const Image& denoised, int probes, ErrorEstimate& estimate) {
   for (size_t c = 0; c < 3; ++c) {
     const Buffer<float>&x = noisy.get(kRgbNames[c]).values, &y = denoised.get(kRgbNames[c]).values;
@@ -40,6 +42,7 @@ void finish(const Image& noisy, const Noise& noise, const Image& denoised, int p
         float& covariance = estimate.covariance[c][i] /= float(probes);
         float& spread = estimate.spread[c][i] /= float(probes);
         if (!isFinite(covariance) || !isFinite(spread)) covariance = spread = 0;
+        if (noise.pixel[i] != PixelNoise::Known) covariance = 0;
         const float residual = y[i] - x[i];
         const float error = residual * residual - noise.variance[c][i] + 2 * covariance;
         const bool known = noise.pixel[i] != PixelNoise::Unknown && isFinite(error);
@@ -68,6 +71,13 @@ ErrorEstimate estimateError(const Image& noisy, const Noise& noise, const Image&
   }
   finish(noisy, noise, denoised, probes, estimate);
   progress.at(1);
+  return estimate;
+}
+
+ErrorEstimate estimateError(const Image& noisy, const Noise& noise, const Image& denoised, NoiseResponse response) {
+  ErrorEstimate estimate{{}, std::move(response.covariance), std::move(response.spread)};
+  for (Buffer<float>& plane : estimate.error) plane = Buffer<float>(noisy.dataWindow.area());
+  finish(noisy, noise, denoised, 1, estimate);
   return estimate;
 }
 

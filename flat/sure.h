@@ -25,7 +25,14 @@ struct SureParams {
   uint64_t seed = 1;
 };
 
-// Per channel R, G, B and pixel of the data window, in squared units of the colours.
+// How a denoised value moves with the noise of the render, per channel R, G, B and pixel of the data window, in squared
+// units of the colours.
+struct NoiseResponse {
+  std::array<Buffer<float>, 3> covariance;  // with the render's own value
+  std::array<Buffer<float>, 3> spread;      // the variance of the denoised value
+};
+
+// Of the same pixels.
 struct ErrorEstimate {
   std::array<Buffer<float>, 3> error;       // SURE: may be negative
   std::array<Buffer<float>, 3> covariance;  // s^2 f': of the noise with the denoised value
@@ -37,5 +44,9 @@ struct ErrorEstimate {
 // the spread and the covariance 0. Throws what the denoiser throws, Error where a plane is missing, and Cancelled.
 ErrorEstimate estimateError(const Image& noisy, const Noise& noise, const Image& denoised, const Denoiser& denoiser,
                             const SureParams& params = {}, const Progress& progress = {});
+
+// The same where the denoiser itself says how its result moves: no further runs. What it says of pixels whose noise is
+// not known does not count.
+ErrorEstimate estimateError(const Image& noisy, const Noise& noise, const Image& denoised, NoiseResponse response);
 
 }  // namespace fathom::flat

@@ -74,6 +74,9 @@ TEST(TimeBudget, CostsAreLinearInPixelsAndBins) {
   EXPECT_DOUBLE_EQ(expectedSeconds(cost, {.megapixels = 2, .binsPerPixel = 1.5}, 1), 2 * (3 + 5 * 1.5 + 7));
   EXPECT_DOUBLE_EQ(expectedSeconds(cost, {}, 4), 4 * (3 + 5 + 7));
   EXPECT_DOUBLE_EQ(expectedSeconds(cost, {.runs = 3}, 1), 3 * (3 + 5 + 7));
+  const SettingCost flat{{Quality::Fast, false, "nlm"}, 3, 5, 7, 0.5};
+  EXPECT_DOUBLE_EQ(expectedSeconds(flat, {.runs = 3}, 1), 3 + 5 + 7) << "tells its errors by itself";
+  EXPECT_DOUBLE_EQ(expectedSeconds(flat, {.runs = 3, .flatRuns = 3}, 1), 3 * (3 + 5 + 7));
   const double one = expectedSeconds(cost, {.components = false}, 1);
   EXPECT_LT(one, 15);
   EXPECT_GT(one, 7) << "the network sees no components";

@@ -158,8 +158,8 @@ struct OnePixel {
 
 TEST(Selection, EstimatesOfOneCandidateByHand) {
   const OnePixel pixel(1, 2);
-  Candidates stein(pixel.data, 1, {ErrorEstimate::Stein, false}, false);
-  Candidates other(pixel.data, 1, {ErrorEstimate::OtherHalf, false}, false);
+  Candidates stein(pixel.data, 1, {ErrorEstimate::Stein, false});
+  Candidates other(pixel.data, 1, {ErrorEstimate::OtherHalf, false});
   pixel.add(0, 1.25f, 1.5f, 2, stein);
   pixel.add(0, 1.25f, 1.5f, 2, other);
   const float between = 0.25f * 0.25f / 4;  // variance of the filtered mean
@@ -171,7 +171,7 @@ TEST(Selection, TheBestCandidateOfAnyBankIsTakenWhole) {
   const OnePixel pixel(1, 2);
   const float good[2] = {1.45f, 1.55f}, bad[2] = {4, 4};
   for (const int best : {0, 1}) {
-    Candidates candidates(pixel.data, 2, {ErrorEstimate::Stein, true}, false);
+    Candidates candidates(pixel.data, 2, {ErrorEstimate::Stein, true});
     pixel.add(0, best == 0 ? good[0] : bad[0], best == 0 ? good[1] : bad[1], 1, candidates);
     pixel.add(1, best == 1 ? good[0] : bad[0], best == 1 ? good[1] : bad[1], 1, candidates);
     EXPECT_FLOAT_EQ(blendCandidates(pixel.data, pixel.still, std::move(candidates), 1, 0).value[0], 1.5f) << best;
@@ -181,7 +181,7 @@ TEST(Selection, TheBestCandidateOfAnyBankIsTakenWhole) {
 TEST(Selection, ABankThatFindsNothingTakesWhatAnotherFound) {
   const OnePixel pixel(1, 2);
   for (const int silent : {0, 1}) {
-    Candidates candidates(pixel.data, 2, {}, false);
+    Candidates candidates(pixel.data, 2, {});
     pixel.add(silent, 0, 0, 0, candidates);
     pixel.add(1 - silent, 1.5f, 1.5f, 1, candidates);
     EXPECT_FLOAT_EQ(blendCandidates(pixel.data, pixel.still, std::move(candidates), 1, 0).value[0], 1.5f) << silent;

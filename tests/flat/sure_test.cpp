@@ -176,6 +176,32 @@ TEST(Sure, OfFramesWithoutNoiseIsTheSquaredResidual) {
   }
 }
 
+// A response that the denoiser tells itself; where the noise is not known, or known to be none, it says nothing.
+TEST(Sure, TakesATellingDenoisersWord) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Image noisy = makeNoisyFlat(9, 7, 1).noisy;
+  const Image denoised = reference::boxMean(noisy);
+  noisy.find("G")->values[3] = nan;
+  for (const char* c : kRgbNames) noisy.find(std::string("variance.") + c)->values[5] = 0;
+  NoiseResponse response;
+  for (size_t c = 0; c < 3; ++c) {
+    response.covariance[c] = Buffer<float>(63, 0.003f);
+    response.spread[c] = Buffer<float>(63, 0.002f);
+  }
+  response.covariance[1][8] = nan;
+  const Noise noise = noiseOf(noisy);
+  const ErrorEstimate e = estimateError(noisy, noise, denoised, std::move(response));
+  for (size_t i = 0; i < 63; ++i) {
+    const float residual = denoised.get("G").values[i] - noisy.get("G").values[i];
+    const bool tells = i != 3 && i != 5 && i != 8;
+    EXPECT_EQ(e.covariance[1][i], tells ? 0.003f : 0) << i;
+    if (i == 3)
+      EXPECT_EQ(e.error[1][i], 0.002f);
+    else
+      EXPECT_FLOAT_EQ(e.error[1][i], residual * residual - noise.variance[1][i] + 2 * e.covariance[1][i]) << i;
+  }
+}
+
 TEST(Sure, StopsWhenTold) {
   std::stop_source stop;
   stop.request_stop();
