@@ -24,9 +24,7 @@ BaseDenoiser oidnBase(const BaseOptions& options, deep::Quality quality, size_t 
   }
   params.scratchMegabytes = int(std::clamp<size_t>(scratch / 1'000'000, 1, 1'000'000));
   const auto library = flat::loadOidn(options.oidnLibrary);
-  return {.denoise = flat::oidn(library, params),
-          .settings = flat::describeOidn(*library, params),
-          .bytes = [scratch](size_t pixels) { return oidnBytes(pixels, scratch); }};
+  return {.denoise = flat::oidn(library, params), .settings = flat::describeOidn(*library, params), .bytes = oidnBytes};
 }
 
 Model modelOf(const BaseOptions& options, deep::Quality quality) {
@@ -41,7 +39,10 @@ BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_
   const auto counts = std::make_shared<flat::NeuralCounts>();
   return {.denoise = flat::neural(model.net, params, counts),
           .settings = fmt::format("{} components {}", model.settings, options.components),
-          .bytes = [net = model.net, params](size_t pixels) { return flat::neuralBytes(*net, params, pixels); },
+          .bytes =
+              [net = model.net, params](size_t pixels, size_t room) {
+                return flat::neuralBytes(*net, {params.components, std::max<size_t>(room, 1)}, pixels);
+              },
           .readsStatistics = true,
           .addCounts =
               [counts](std::map<std::string, uint64_t>& sums) {

@@ -36,8 +36,8 @@ struct BaseOptions {
 // Adds --method (or --base, as it was called), --model, --components and --oidn-library.
 void addBaseOptions(CLI::App& command, BaseOptions& options);
 
-// Bytes that a denoiser takes beside an image of so many pixels.
-using BytesOf = std::function<size_t(size_t pixels)>;
+// Bytes that a denoiser takes beside an image of so many pixels, where it may use `scratch` to work in.
+using BytesOf = std::function<size_t(size_t pixels, size_t scratch)>;
 
 struct BaseDenoiser {
   flat::Denoiser denoise;

@@ -162,7 +162,7 @@ void addDenoise(CLI::App& app) {
       ->default_str(command->request.guide);
   sub->add_flag("--error", command->request.errors,
                 "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "
-                "flattened ones (three times the work; none for flat frames with half buffers and --base nlm)");
+                "flattened ones (three times the work; none for flat frames with half buffers and --method nlm)");
   sub->add_flag("--no-gate", command->noGate, "The filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")

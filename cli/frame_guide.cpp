@@ -70,7 +70,7 @@ GuidePlan oidnGuide(const std::shared_ptr<const flat::OidnLibrary>& library, boo
   return {{flat::oidn(library, params), flat::oidn(library, bins), {}},
           true,
           fmt::format("{} bins {}", flat::describeOidn(*library, params), flat::describeOidn(*library, bins)),
-          [scratch](size_t pixels) { return oidnBytes(pixels, scratch); }};
+          oidnBytes};
 }
 
 GuidePlan neuralGuide(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
@@ -107,7 +107,7 @@ NamedGuide bestGuide(std::vector<NamedGuide> guides, const deep::DenoisePlan& pl
 // Whether a guide of whole frames leaves memory for the frame `source` itself.
 bool fits(const GuidePlan& guide, FrameSource& source, size_t memory) {
   const size_t pixels = source.part().dataWindow.area();
-  const GuideBytes bytes = guideBytes(guide, pixels);
+  const GuideBytes bytes = guideBytes(guide, pixels, memory);
   const size_t all = pixels * (bytes.madePerPixel + bytes.keptPerPixel) + bytes.library;
   return double(all) <= kMostOfMemory * double(workingBytes(memory));
 }
@@ -125,11 +125,11 @@ bool canBeGuided(const deep::DenoiseInputs& inputs) {
   return inputs.variance || inputs.halves;
 }
 
-GuideBytes guideBytes(const GuidePlan& guide, size_t pixels) {
+GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory) {
   if (!guide.wholeFrame) return {.madePerPixel = kFlattenedBytes};
   GuideBytes bytes{kFlattenedBytes, kKeptBytes, 0};
   if (guide.denoisers.bins) bytes.madePerPixel += kPicturesBytes;
-  if (guide.bytes) bytes.library = guide.bytes(pixels);
+  if (guide.bytes) bytes.library = guide.bytes(pixels, decodedLimit(memory));
   return bytes;
 }
 

@@ -24,8 +24,8 @@ struct GuidePlan {
 struct GuideBytes {
   size_t madePerPixel = 0, keptPerPixel = 0, library = 0;
 };
-// For a frame, or a band where those are guided, of so many pixels.
-GuideBytes guideBytes(const GuidePlan& guide, size_t pixels);
+// For a frame, or a band where those are guided, of so many pixels, in a run that may take `memory` bytes.
+GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory);
 
 // Whether frames that offer this say enough of their noise to be guided.
 bool canBeGuided(const deep::DenoiseInputs& inputs);

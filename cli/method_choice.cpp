@@ -46,7 +46,7 @@ MethodChoice chooseMethod(const BaseOptions& options, const flat::Image& noisy, 
     BaseOptions named = options;
     named.name = name;
     const BaseDenoiser base = makeBase(named, plan, limits.scratch);
-    if (base.bytes && base.bytes(limits.pixels) > limits.room) {
+    if (base.bytes && base.bytes(limits.pixels, limits.scratch) > limits.room) {
       best.why = "promises the least error of those that fit the memory";
       continue;
     }

@@ -68,9 +68,11 @@ TEST(NeuralPlanes, EqualTraining) {
 // What is not finite is as good as 0, wherever it stands.
 TEST(NeuralPlanes, NonFiniteValuesAreZeros) {
   Image zeros = storedImage("full"), odd = storedImage("full");
+  const size_t area = odd.dataWindow.area();
+  ASSERT_GT(area, 0U);
   size_t at = 3;
   for (size_t p = 0; p < odd.planes.size(); ++p, at += 5) {
-    const size_t i = at % odd.dataWindow.area();
+    const size_t i = at % area;
     zeros.planes[p].values[i] = 0;
     odd.planes[p].values[i] = p % 3 == 0 ? kNaN : p % 3 == 1 ? kInf : -kInf;
   }
