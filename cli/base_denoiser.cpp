@@ -5,19 +5,76 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
+#include "cli/memory_limit.h"
+#include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
 #include "flat/error.h"
+#include "flat/neural.h"
 #include "flat/oidn.h"
 
 namespace fathom::cli {
 
+namespace {
+
+BaseDenoiser oidnBase(const BaseOptions& options, deep::Quality quality, size_t scratch) {
+  flat::OidnParams params;
+  if (quality == deep::Quality::Fast) {
+    params.quality = flat::OidnParams::Quality::Fast;
+    params.prefilterGuides = false;
+  }
+  params.scratchMegabytes = int(std::clamp<size_t>(scratch / 1'000'000, 1, 1'000'000));
+  const auto library = flat::loadOidn(options.oidnLibrary);
+  return {.denoise = flat::oidn(library, params), .settings = flat::describeOidn(*library, params), .bytes = oidnBytes};
+}
+
+Model modelOf(const BaseOptions& options, deep::Quality quality) {
+  if (!options.model.empty()) return loadModel(options.model);
+  const std::string name = defaultModel(quality == deep::Quality::Best);
+  return loadModel(name.empty() ? "small" : name);
+}
+
+BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_t scratch) {
+  const Model model = modelOf(options, quality);
+  const flat::NeuralParams params{options.components, std::max<size_t>(scratch, 1)};
+  const auto counts = std::make_shared<flat::NeuralCounts>();
+  return {.denoise = flat::neural(model.net, params, counts),
+          .settings = fmt::format("{} components {}", model.settings, options.components),
+          .bytes =
+              [net = model.net, params](size_t pixels, size_t room) {
+                return flat::neuralBytes(*net, {params.components, std::max<size_t>(room, 1)}, pixels);
+              },
+          .readsStatistics = true,
+          .addCounts =
+              [counts](std::map<std::string, uint64_t>& sums) {
+                sums["network pixels"] += counts->denoised.exchange(0);
+                sums["network pixels skipped"] += counts->skipped.exchange(0);
+              }};
+}
+
+}  // namespace
+
 void addBaseOptions(CLI::App& command, BaseOptions& options) {
   command
-      .add_option("--base", options.name,
-                  "The denoiser of flat frames: Fathom's own, or Open Image Denoise where it is installed")
-      ->type_name("nlm|oidn")
-      ->check(CLI::IsMember({kOwnBase, "oidn"}).description(""))
+      .add_option("--method,--base", options.name,
+                  "The denoiser of flat frames: Fathom's own filter, its network, or Open Image Denoise where it is "
+                  "installed; auto takes the one that promises the least error on the first frame")
+      ->type_name("nlm|neural|oidn|auto")
+      ->check(CLI::IsMember({kOwnBase, kNeuralBase, kOidnBase, kAutoBase}).description(""))
       ->default_str(options.name);
+  command
+      .add_option(
+          "--model", options.model,
+          "The network's weights, of those that `fathom models` lists or in a file (default: base for --quality "
+          "best, else small)")
+      ->type_name("small|base|FILE");
+  command
+      .add_option_function<std::string>(
+          "--components",
+          [&options](const std::string& text) { options.components = text == "auto" ? 0 : text[0] - '0'; },
+          "How many parts the network splits each light into: more take more time")
+      ->type_name("1|2|4|auto")
+      ->check(CLI::IsMember({"1", "2", "4", "auto"}).description(""))
+      ->default_str("auto");
   command
       .add_option("--oidn-library", options.oidnLibrary,
                   "Open Image Denoise's library, or the folder it is in (default: FATHOM_OIDN_LIBRARY, else where the "
@@ -45,15 +102,13 @@ std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path) {
 }
 
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
-  if (options.name == kOwnBase) return {deep::flatNlMeans(plan), describeFilter(plan)};
-  flat::OidnParams params;
-  if (plan.params.quality == deep::Quality::Fast) {
-    params.quality = flat::OidnParams::Quality::Fast;
-    params.prefilterGuides = false;
-  }
-  params.scratchMegabytes = int(std::clamp<size_t>(scratch / 1'000'000, 1, 1'000'000));
-  const auto library = flat::loadOidn(options.oidnLibrary);
-  return {flat::oidn(library, params), flat::describeOidn(*library, params)};
+  if (options.name == kOidnBase) return oidnBase(options, plan.params.quality, scratch);
+  if (options.name == kNeuralBase) return neuralBase(options, plan.params.quality, scratch);
+  return {.denoise = deep::flatNlMeans(plan), .settings = describeFilter(plan)};
+}
+
+bool hasModel(const BaseOptions& options) {
+  return !options.model.empty() || !defaultModel(false).empty();
 }
 
 }  // namespace fathom::cli

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -19,27 +22,42 @@ struct OidnLibrary;
 namespace fathom::cli {
 
 constexpr const char* kOwnBase = "nlm";
+constexpr const char* kOidnBase = "oidn";
+constexpr const char* kNeuralBase = "neural";
+constexpr const char* kAutoBase = "auto";  // one of the others: see cli/method_choice
 
 struct BaseOptions {
-  std::string name = kOwnBase;  // or "oidn"
-  std::string oidnLibrary;      // file or folder; empty: see flat::loadOidn
+  std::string name = kOwnBase;
+  std::string oidnLibrary = {};  // file or folder; empty: see flat::loadOidn
+  std::string model = {};        // name or file; empty: see defaultModel
+  int components = 0;            // of the network: 1, 2, 4; 0: see flat::NeuralParams
 };
 
-// Adds --base and --oidn-library.
+// Adds --method (or --base, as it was called), --model, --components and --oidn-library.
 void addBaseOptions(CLI::App& command, BaseOptions& options);
+
+// Bytes that a denoiser takes beside an image of so many pixels, where it may use `scratch` to work in.
+using BytesOf = std::function<size_t(size_t pixels, size_t scratch)>;
 
 struct BaseDenoiser {
   flat::Denoiser denoise;
-  std::string settings;  // all that decides its result, as text to be hashed
+  std::string settings;          // all that decides its result, as text to be hashed
+  BytesOf bytes = {};            // none: counted with the image
+  bool readsStatistics = false;  // variances, half buffers and counts
+  std::function<void(std::map<std::string, uint64_t>&)> addCounts = {};  // of what it did since it was asked last
 };
 
-// The denoiser of that name. `plan`: that of flat frames (deep::planFlat), whose quality chooses the method of oidn, too:
-// Fast its fast network with the guides as they are, else its best one with guides denoised first. `scratch`: bytes that
-// oidn may use beside the images. Throws Error where its library is not found.
+// The denoiser of that name, which is not kAutoBase. `plan`: that of flat frames (deep::planFlat), whose quality chooses the
+// method of oidn, too: Fast its fast network with the guides as they are, else its best one with guides denoised first; and
+// the model of neural, where none is named. `scratch`: bytes that a library or network may use beside the images. Throws
+// Error where its library or its model is not found.
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch);
 
 // Open Image Denoise's library, or nothing where it is not found: see flat::loadOidn.
 std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path);
+
+// Whether a model is named or installed. It may still be one that cannot be read.
+bool hasModel(const BaseOptions& options);
 
 // All of a plan that decides what our own filter makes, as text to be hashed.
 std::string describeFilter(const deep::DenoisePlan& plan);

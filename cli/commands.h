@@ -10,6 +10,7 @@ void addInfo(CLI::App& app);
 void addConvert(CLI::App& app);
 void addCluster(CLI::App& app);
 void addDenoise(CLI::App& app);
+void addModels(CLI::App& app);
 void addProgressive(CLI::App& app);
 void addCompare(CLI::App& app);
 void addPng(CLI::App& app);

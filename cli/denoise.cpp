@@ -134,7 +134,7 @@ void addDenoise(CLI::App& app) {
       ->required()
       ->check(understood(parsePattern));
   option("--flat", command->request.flattened, "OUT2", "Also write the flattened result");
-  sub->add_flag("--components", command->request.components,
+  sub->add_flag("--split", command->request.split,
                 "Also write diffuse and specular each to a file beside OUT (which holds both as channels)");
   CLI::Option* quality = option("--quality", command->quality, "fast|balanced|best",
                                 "fast takes three quarters of the time of balanced, best two and a half times as much")
@@ -147,22 +147,22 @@ void addDenoise(CLI::App& app) {
           "et al., or RDFC, as far as it is known here")
           ->check(CLI::IsMember({"own", "paper", "rdfc"}).description(""))
           ->default_str(command->filter);
-  option("--time-budget", command->budget, "SECONDS",
-         "Choose the quality, and the guide or the base where none is named, for so much work on a frame, reading and "
-         "writing aside; once for a sequence, whose outputs record it")
+  option(
+      "--time-budget", command->budget, "SECONDS",
+      "Choose the quality, and the guide or the method where none is named, for so much work on a frame, reading and "
+      "writing aside; once for a sequence, whose outputs record it")
       ->check(CLI::Validator(isTime, ""))
       ->excludes(quality)
       ->excludes(filter);
   addBaseOptions(*sub, command->request.base);
-  option("--flat-guide", command->request.guide, "auto|nlm|oidn|none|FILE",
-         "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of Open Image "
-         "Denoise, which also helps with the bins, or in a file; auto is oidn where that is installed (but for fast), "
-         "else "
-         "nlm for best")
+  option("--flat-guide", command->request.guide, "auto|nlm|neural|oidn|none|FILE",
+         "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of its network or "
+         "Open Image Denoise, which also help with the bins, or in a file; auto is oidn where that is installed (but "
+         "for fast), else nlm for best")
       ->default_str(command->request.guide);
   sub->add_flag("--error", command->request.errors,
                 "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "
-                "flattened ones (three times the work; none for flat frames with half buffers and --base nlm)");
+                "flattened ones (three times the work; none for flat frames with half buffers and --method nlm)");
   sub->add_flag("--no-gate", command->noGate, "The filter alone, which lets some light bleed between bins");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")
@@ -189,7 +189,7 @@ void addDenoise(CLI::App& app) {
   sub->add_flag("--overwrite", command->request.overwrite, "Replace outputs that other settings or another input made");
   sub->callback([command, sub] {
     if (sub->count("--time-budget") > 0) command->request.timeBudget = command->budget;
-    command->request.anyBase = sub->count("--base") == 0;
+    command->request.anyBase = sub->count("--method") == 0 || command->request.base.name == kAutoBase;
     runDenoise(*command);
   });
 }

@@ -51,24 +51,45 @@ std::vector<Band> cutBands(const FrameSource& source, const Rows& rows, int halo
       source.path(), memoryFor(fixed + most) / 1'000'000 + 1, guide, 2 * halo, memory / 1'000'000);
 }
 
+GuideBytes bytesOfGuide(const SequencePlan& plan, size_t pixels, size_t memory) {
+  return plan.guide ? guideBytes(*plan.guide, pixels, memory) : GuideBytes{};
+}
+
+size_t wholeFrameBytes(FrameSource& source, const SequencePlan& plan, size_t memory) {
+  const Box& window = source.part().dataWindow;
+  const GuideBytes guide = bytesOfGuide(plan, window.area(), memory);
+  const size_t library =
+      plan.base && plan.base->bytes ? plan.base->bytes(window.area(), decodedLimit(memory)) : guide.library;
+  return Rows(source, imagesInMemory(plan.errors), guide.madePerPixel).bytes(window.y0, window.y1) + library;
+}
+
+// How much would do, where `memory` does not: libraries take more where they may.
+size_t memoryForWholeFrame(FrameSource& source, const SequencePlan& plan, size_t memory) {
+  constexpr int kMostSteps = 64;  // each takes a quarter of what the last one added
+  for (int step = 0; step < kMostSteps; ++step) {
+    const size_t needed = memoryFor(wholeFrameBytes(source, plan, memory));
+    if (needed <= memory) break;
+    memory = needed;
+  }
+  return memory;
+}
+
 }  // namespace
 
 std::vector<Band> planBands(FrameSource& source, const SequencePlan& plan, int halo, size_t memory) {
   const Box& window = source.part().dataWindow;
-  const GuideBytes guide = plan.guide ? guideBytes(*plan.guide, window.area(), memory) : GuideBytes{};
-  const size_t images = plan.errors ? kImagesWithErrors : kImagesInMemory;
-  const size_t library = plan.base ? oidnBytes(window.area(), memory) : guide.library;
-  const size_t whole = Rows(source, images, guide.madePerPixel).bytes(window.y0, window.y1) + library;
-  if (whole <= workingBytes(memory)) return {{window.y0, window.y1}};
+  const GuideBytes guide = bytesOfGuide(plan, window.area(), memory);
+  const size_t images = imagesInMemory(plan.errors);
+  if (wholeFrameBytes(source, plan, memory) <= workingBytes(memory)) return {{window.y0, window.y1}};
   if (plan.base || plan.errors)
     fail(
-        "{}: expected at least {} MB of memory, for a whole frame, which --base and --error need; found a limit of {} "
-        "MB",
-        source.path(), memoryFor(whole) / 1'000'000 + 1, memory / 1'000'000);
+        "{}: expected at least {} MB of memory, for a whole frame, which --method and --error need; found a limit of "
+        "{} MB",
+        source.path(), memoryForWholeFrame(source, plan, memory) / 1'000'000 + 1, memory / 1'000'000);
   if (!plan.guide || !plan.guide->wholeFrame)
     return cutBands(source, Rows(source, images, guide.madePerPixel), halo, 0, memory);
   // A frame's guide is made while the last one's is still in use.
-  const size_t fixed = window.area() * (guide.madePerPixel + guide.keptPerPixel) + library;
+  const size_t fixed = window.area() * (guide.madePerPixel + guide.keptPerPixel) + guide.library;
   return cutBands(source, Rows(source, images, guide.keptPerPixel), halo, fixed, memory);
 }
 

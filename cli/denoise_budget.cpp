@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 
 #include "flat/error.h"
@@ -18,14 +19,14 @@ constexpr double kMostClustered = 3;
 std::vector<std::string> openWays(const DenoiseRequest& request, const SequencePlan& plan) {
   if (!plan.deep) {
     if (!request.anyBase) return {request.base.name};
-    const bool network = !plan.denoise.inputs.components && !request.components && findOidn(request.base.oidnLibrary);
-    return network ? std::vector<std::string>{kOwnBase, "oidn"} : std::vector<std::string>{kOwnBase};
+    const bool library = !plan.denoise.inputs.components && !request.split && findOidn(request.base.oidnLibrary);
+    return library ? std::vector<std::string>{kOwnBase, kOidnBase} : std::vector<std::string>{kOwnBase};
   }
   const std::string choice = guideChoice(request);
   if (isGuideFile(choice)) return {kGuideFile};
   if (choice != "auto") return {choice};
   if (!canBeGuided(plan.denoise.inputs)) return {"none"};
-  if (findOidn(request.base.oidnLibrary)) return {"none", kOwnBase, "oidn"};
+  if (findOidn(request.base.oidnLibrary)) return {"none", kOwnBase, kOidnBase};
   return {"none", kOwnBase};
 }
 
@@ -78,6 +79,10 @@ BudgetPlan planBudget(const DenoiseRequest& request, const SequencePlan& plan, c
           found->path, found->record.setting);
   }
   const std::vector<std::string> ways = openWays(request, plan);
+  if (ways.front() == kNeuralBase)
+    throw CLI::ValidationError(
+        "--time-budget", fmt::format("expected a method or guide whose cost is known ({} or {}), found {}", kOwnBase,
+                                     kOidnBase, kNeuralBase));
   const BudgetChoice choice =
       chooseSetting(costsOf(plan.deep, ways), workloadOf(plan), *request.timeBudget, slowness());
   const std::string setting = describeSetting(choice.setting);

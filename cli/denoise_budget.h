@@ -19,7 +19,7 @@ struct BudgetPlan {
 // The outputs of the sequence that may be there, in the order of their frames, whether they are among a run's or not.
 // The first that was made with a budget decides; where `request.overwrite`, only one made with this budget does. Where
 // none does, the setting is chosen (cli/time_budget) among what the request leaves open: the guide of deep frames unless it
-// names one, of flat frames the base where it may (DenoiseRequest::anyBase), for frames without components, which Open
+// names one, of flat frames the base where it may (DenoiseRequest::anyBase; the network's costs are not known), for frames without components, which Open
 // Image Denoise would drop. `slowness`: of this machine against that of the measurement; asked for only where a choice
 // is made. `plan`: decided but for what the budget decides. Throws Error where the outputs' setting contradicts the
 // request.

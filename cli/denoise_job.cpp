@@ -12,6 +12,7 @@
 #include "cli/calibration.h"
 #include "cli/denoise_budget.h"
 #include "cli/memory_limit.h"
+#include "cli/method_choice.h"
 #include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
 #include "flat/error.h"
@@ -62,7 +63,7 @@ std::vector<DenoiseFrame> framesOf(const DenoiseRequest& request, const Sequence
     frame.outputs.image = output.at(number);
     if (!request.flattened.empty())
       frame.outputs.flattened = outputPattern("--flat", request.flattened, sequence.pattern).at(number);
-    if (request.components)
+    if (request.split)
       for (const char* component : {"diffuse", "specular"})
         frame.outputs.components[component] = beside(output, component).at(number);
     frames.push_back(std::move(frame));
@@ -130,18 +131,55 @@ DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequenc
   return job;
 }
 
+// A flat frame as it would be written.
+flat::Image toFlatFrame(deep::DeepImage image, std::map<std::string, std::string> attributes) {
+  deep::unmakeOneBin(image);
+  flat::Image flat = deep::toFlat(image);
+  flat.attributes = std::move(attributes);
+  return flat;
+}
+
 // What denoises flat frames in the place of our own filter.
 void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   const std::string& name = request.base.name;
-  if (request.components) usage("--components", fmt::format("expected --base {}, found {}", kOwnBase, name));
+  if (request.split && name == kOidnBase)
+    usage("--split", fmt::format("expected a --method that keeps components apart, found {}", name));
   plan.base = makeBase(request.base, plan.denoise, decodedLimit(request.memory));
   const deep::DenoiseInputs& inputs = plan.denoise.inputs;
   const auto note = [&](const std::string& line) { plan.notes.insert(fmt::format("{}: {}", plan.first, line)); };
   for (const std::string& line : deep::describeMissing(inputs))
     plan.notes.erase(fmt::format("{}: {}", plan.first, line));
+  if (plan.base->readsStatistics) {
+    plan.firstImage.reset();  // it has the statistics of our own filter
+    if (!inputs.albedo || !inputs.normal) note("no albedo.* or N.*: the network has less to go by");
+    if (!inputs.variance && !inputs.halves)
+      note("no variance.*, no half0.* and half1.*: the network guesses the noise");
+    return;
+  }
   if (!inputs.albedo) note("no albedo.*: the colours have no guides");
   if (inputs.albedo && !inputs.normal) note("no N.*: the albedo guides alone");
   if (inputs.components) note(fmt::format("diffuse.* and specular.* are left out: {} denoises their sum", name));
+}
+
+// The base of flat frames, where it is to be chosen.
+void chooseBase(SequencePlan& plan, DenoiseRequest& request, const SourceOptions& options,
+                const std::vector<FrameInputs>& candidates) {
+  const auto first =
+      std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
+  FrameSource source(*first, options);
+  std::set<std::string> told;
+  const Box middle = middleOf(source.part().dataWindow);
+  flat::Image rows = toFlatFrame(source.read(middle.y0, middle.y1, told), source.flatAttributes());
+  const Box& window = source.part().dataWindow;
+  const size_t images = imagesInMemory(request.errors) * source.decodedBytes(window.y0, window.y1);
+  const size_t memory = workingBytes(request.memory);
+  const MethodLimits limits{.scratch = decodedLimit(request.memory),
+                            .keepComponents = plan.denoise.inputs.components,
+                            .pixels = window.area(),
+                            .room = memory - std::min(memory, images)};
+  const MethodChoice choice = chooseMethod(request.base, flat::crop(rows, middle), plan.denoise, limits);
+  request.base.name = choice.name;
+  plan.notes.insert(fmt::format("{}: denoised by {}, which {}", plan.first, choice.name, choice.why));
 }
 
 // What guides the bins of deep frames.
@@ -182,9 +220,10 @@ SequencePlan makePlan(DenoiseRequest request, const Sequence& sequence, const So
   plan.errors = request.errors;
   if (!plan.deep && !request.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
-  if (request.components && !plan.denoise.inputs.components)
-    fail("{}: expected diffuse.* and specular.* for --components, found neither", request.input);
+  if (request.split && !plan.denoise.inputs.components)
+    fail("{}: expected diffuse.* and specular.* for --split, found neither", request.input);
   if (request.timeBudget) setBudget(plan, request, sequence);
+  if (!plan.deep && request.base.name == kAutoBase) chooseBase(plan, request, source, candidates);
   if (plan.deep)
     setGuide(plan, request, source, candidates);
   else if (request.base.name != kOwnBase)
@@ -192,24 +231,17 @@ SequencePlan makePlan(DenoiseRequest request, const Sequence& sequence, const So
   return plan;
 }
 
-// A flat frame as it would be written.
-flat::Image toFlatFrame(deep::DeepImage image, std::map<std::string, std::string> attributes) {
-  deep::unmakeOneBin(image);
-  flat::Image flat = deep::toFlat(image);
-  flat.attributes = std::move(attributes);
-  return flat;
-}
-
 }  // namespace
 
 bool isGuideFile(const std::string& guide) {
-  for (const char* word : {"auto", "nlm", "oidn", "none"})
+  for (const char* word : {"auto", kOwnBase, kNeuralBase, kOidnBase, "none"})
     if (guide == word) return false;
   return true;
 }
 
 std::string guideChoice(const DenoiseRequest& request) {
-  return request.guide == "auto" && request.base.name != kOwnBase ? request.base.name : request.guide;
+  const bool named = request.base.name != kOwnBase && request.base.name != kAutoBase;
+  return request.guide == "auto" && named ? request.base.name : request.guide;
 }
 
 DenoiseJob makeDenoiseJob(const DenoiseRequest& request, const Sequence& sequence, bool overlap) {

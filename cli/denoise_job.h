@@ -17,7 +17,7 @@ namespace fathom::cli {
 struct DenoiseRequest {
   std::string input, output, flattened;
   std::string features, alpha;
-  std::string guide = "auto";       // or nlm, oidn, none, a file: see planGuide
+  std::string guide = "auto";       // or nlm, neural, oidn, none, a file: see planGuide
   std::vector<std::string> halves;  // none or two
   std::string map, part;
   deep::DenoiseParams params;
@@ -26,8 +26,8 @@ struct DenoiseRequest {
   // cli/denoise_budget).
   std::optional<double> timeBudget;
   bool anyBase = false;  // the budget may choose the base of flat frames, too
-  bool components = false;
-  bool errors = false;  // error.{R,G,B} beside the colours
+  bool split = false;    // diffuse and specular also in files of their own
+  bool errors = false;   // error.{R,G,B} beside the colours
   bool overwrite = false;
   size_t memory = size_t(8) << 30;
 };
@@ -35,7 +35,7 @@ struct DenoiseRequest {
 // Whether a choice of guide is a file's name.
 bool isGuideFile(const std::string& guide);
 
-// The guide that is asked for: --base says it, too.
+// The guide that is asked for: --method says it, too.
 std::string guideChoice(const DenoiseRequest& request);
 
 // The frames of `sequence`, which is that of the input, or a part of it. The plan comes from the first frame on disk,

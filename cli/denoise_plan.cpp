@@ -48,12 +48,22 @@ void findInputs(SequencePlan& plan, FrameSource& source) {
     plan.notes.insert(fmt::format("{}: {}", source.path(), line));
 }
 
-// Only what is wanted by the denoiser and for the output is read. Another base takes no statistics.
-void wantInputs(const deep::DenoisePlan& plan, bool otherBase, FrameSource& source) {
-  source.want([plan, otherBase](const std::string& name) {
-    const bool statistic = deep::describesSamples(deep::roleOf(name, deep::PixelType::Float));
-    return !statistic || plan.params.keepStatistics || (!otherBase && deep::denoiseReads(plan.inputs, name));
+enum class Statistics { None, OfOwnFilter, All };
+
+// Only what is wanted by the denoiser and for the output is read.
+void wantInputs(const deep::DenoisePlan& plan, Statistics statistics, FrameSource& source) {
+  source.want([plan, statistics](const std::string& name) {
+    if (plan.params.keepStatistics || statistics == Statistics::All) return true;
+    if (!deep::describesSamples(deep::roleOf(name, deep::PixelType::Float))) return true;
+    return statistics == Statistics::OfOwnFilter && deep::denoiseReads(plan.inputs, name);
   });
+}
+
+// Another base may take all statistics, or none but what tells errors.
+Statistics statisticsOf(const SequencePlan& plan) {
+  if (!plan.base) return Statistics::OfOwnFilter;
+  if (plan.base->readsStatistics) return Statistics::All;
+  return plan.errors ? Statistics::OfOwnFilter : Statistics::None;
 }
 
 SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, const deep::DenoiseParams& params,
@@ -64,7 +74,7 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   FrameSource source(inputs, options);
   plan.deep = source.deep();
   findInputs(plan, source);
-  wantInputs(plan.denoise, false, source);
+  wantInputs(plan.denoise, Statistics::OfOwnFilter, source);
   const auto look = [&](const deep::DeepImage& image) {
     plan.denoise.level = deep::meanLevel(image);
     plan.pixels = image.pixels();
@@ -113,6 +123,7 @@ deep::DeepImage denoiseFlat(deep::DeepImage image, const SequencePlan& plan, con
   image = plan.base
               ? deep::applyFlat(std::move(image), plan.base->denoise, plan.denoise.params.keepStatistics, first, stats)
               : deep::denoise(std::move(image), plan.denoise, first, stats);
+  if (stats && plan.base && plan.base->addCounts) plan.base->addCounts(stats->counts);
   if (!plan.errors) return image;
   const Stopwatch watch;
   const Progress second{[&](double done) { progress.at(part + (1 - part) * done); }, progress.stop};
@@ -164,7 +175,7 @@ FrameSource openFrame(const FrameInputs& inputs, const SourceOptions& options, c
     source.clusterFirst();
     return source;
   }
-  wantInputs(plan.denoise, plan.base.has_value() && !plan.errors, source);
+  wantInputs(plan.denoise, statisticsOf(plan), source);
   return source;
 }
 

@@ -26,7 +26,7 @@ const char* nameOf(deep::Quality quality) {
 }  // namespace
 
 std::string describeSetting(const DenoiseSetting& setting) {
-  return fmt::format("--quality {} {} {}", nameOf(setting.quality), setting.deep ? "--flat-guide" : "--base",
+  return fmt::format("--quality {} {} {}", nameOf(setting.quality), setting.deep ? "--flat-guide" : "--method",
                      setting.with);
 }
 

@@ -19,7 +19,7 @@ struct DenoiseSetting {
   bool operator==(const DenoiseSetting&) const = default;
 };
 
-// The options that ask for it: "--quality balanced --flat-guide nlm", "--quality fast --base oidn".
+// The options that ask for it: "--quality balanced --flat-guide nlm", "--quality fast --method oidn".
 std::string describeSetting(const DenoiseSetting& setting);
 
 // The setting that is described so; nothing for any other text.

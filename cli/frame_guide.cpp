@@ -5,17 +5,17 @@
 #include <algorithm>
 
 #include "cli/memory_limit.h"
+#include "cli/method_choice.h"
 #include "deep/flat_nl_means.h"
 #include "flat/error.h"
 #include "flat/io.h"
+#include "flat/noise.h"
 #include "flat/oidn.h"
-#include "flat/sure.h"
 
 namespace fathom::cli {
 
 namespace {
 
-constexpr int kSampleSide = 384;  // of the middle of the frame that `auto` looks at, pixels
 constexpr int kRowsOfSample = 64;
 
 // Bytes of a pixel, measured: the flattened frame's planes and what our filter, or a library's copies, take beside them;
@@ -69,48 +69,39 @@ GuidePlan oidnGuide(const std::shared_ptr<const flat::OidnLibrary>& library, boo
   bins.prefilterGuides = false;
   return {{flat::oidn(library, params), flat::oidn(library, bins), {}},
           true,
-          fmt::format("{} bins {}", flat::describeOidn(*library, params), flat::describeOidn(*library, bins))};
+          fmt::format("{} bins {}", flat::describeOidn(*library, params), flat::describeOidn(*library, bins)),
+          oidnBytes};
 }
 
-// The expected squared error of a denoiser, relative to what it makes of the picture.
-double expectedError(const flat::Image& noisy, const flat::Denoiser& denoise, float level) {
-  const flat::Noise noise = flat::noiseOf(noisy);
-  const flat::Image denoised = denoise(noisy, {});
-  const flat::ErrorEstimate estimate = flat::estimateError(noisy, noise, denoised, denoise, {.probes = 1});
-  const double dark = 0.04 * double(level) * double(level);  // 0.01 where the mean is 0.5, as in relMSE
-  double sum = 0;
-  for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < denoised.planes[c].values.size(); ++i) {
-      const double f = double(denoised.planes[c].values[i]);
-      sum += double(estimate.error[c][i]) / (f * f + dark);
-    }
-  return sum;
+GuidePlan neuralGuide(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
+  BaseOptions named = options;
+  named.name = kNeuralBase;
+  const BaseDenoiser base = makeBase(named, plan, scratch);
+  return {{base.denoise, base.denoise, {}}, true, base.settings, base.bytes};
 }
 
-flat::Image middleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
-  const Box& window = source.part().dataWindow;
-  const int width = std::min(kSampleSide, window.width()), height = std::min(kSampleSide, window.height());
-  const int x0 = window.x0 + (window.width() - width) / 2, y0 = window.y0 + (window.height() - height) / 2;
-  const deep::GuideInput input = readInput(source, y0, y0 + height, kRowsOfSample, inputs, false);
-  return flat::crop(input.noisy, {x0, y0, x0 + width, y0 + height});
+flat::Image sampleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
+  const Box middle = middleOf(source.part().dataWindow);
+  const deep::GuideInput input = readInput(source, middle.y0, middle.y1, kRowsOfSample, inputs, false);
+  return flat::crop(input.noisy, middle);
 }
 
-// Which way of Open Image Denoise.
-GuidePlan bestGuide(const std::shared_ptr<const flat::OidnLibrary>& library, const deep::DenoisePlan& plan,
-                    FrameSource& source, size_t scratch, std::string& name) {
-  const flat::Image middle = middleOf(source, plan.inputs);
-  GuidePlan best;
+struct NamedGuide {
+  const char *name, *who;
+  GuidePlan plan;
+};
+
+NamedGuide bestGuide(std::vector<NamedGuide> guides, const deep::DenoisePlan& plan, FrameSource& source) {
+  const flat::Image middle = sampleOf(source, plan.inputs);
+  size_t best = 0;
   double least = 0;
-  const auto consider = [&](const char* called, GuidePlan guide) {
-    const double error = expectedError(middle, guide.denoisers.flattened, plan.level);
-    if (!name.empty() && !(error < least)) return;
-    name = called;
+  for (size_t i = 0; i < guides.size(); ++i) {
+    const double error = expectedError(middle, guides[i].plan.denoisers.flattened, plan.level);
+    if (i > 0 && !(error < least)) continue;
+    best = i;
     least = error;
-    best = std::move(guide);
-  };
-  consider("oidn with prefiltered guides", oidnGuide(library, true, scratch));
-  consider("oidn", oidnGuide(library, false, scratch));
-  return best;
+  }
+  return std::move(guides[best]);
 }
 
 // Whether a guide of whole frames leaves memory for the frame `source` itself.
@@ -137,10 +128,8 @@ bool canBeGuided(const deep::DenoiseInputs& inputs) {
 GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory) {
   if (!guide.wholeFrame) return {.madePerPixel = kFlattenedBytes};
   GuideBytes bytes{kFlattenedBytes, kKeptBytes, 0};
-  if (guide.denoisers.bins) {
-    bytes.madePerPixel += kPicturesBytes;
-    bytes.library = oidnBytes(pixels, memory);
-  }
+  if (guide.denoisers.bins) bytes.madePerPixel += kPicturesBytes;
+  if (guide.bytes) bytes.library = guide.bytes(pixels, decodedLimit(memory));
   return bytes;
 }
 
@@ -151,25 +140,28 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
     if (choice == "auto") return {};
     fail("{}: expected variance.* or half0.* and half1.* for --flat-guide, found neither", source.path());
   }
-  if (choice == "nlm") return nlmGuide(plan);
-  if (choice != "auto" && choice != "oidn") return GuidePlan{{}, true, "file"};
-  if (choice == "auto" && plan.params.quality == deep::Quality::Fast) return {};
-  const auto library = choice == "oidn" ? flat::loadOidn(base.oidnLibrary) : findOidn(base.oidnLibrary);
-  const auto without = [&] {
-    return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
-  };
-  if (!library) return without();
   const size_t scratch = decodedLimit(memory);
-  if (choice == "auto" && !fits(oidnGuide(library, true, scratch), source, memory)) {
-    notes.insert(
-        fmt::format("{}: no guide by Open Image Denoise: whole frames of it take more than the memory", source.path()));
-    return without();
+  if (choice == kOwnBase) return nlmGuide(plan);
+  if (choice == kNeuralBase) return neuralGuide(base, plan, scratch);
+  if (choice != "auto" && choice != kOidnBase) return GuidePlan{{}, true, "file"};
+  if (choice == "auto" && plan.params.quality == deep::Quality::Fast) return {};
+  std::vector<NamedGuide> guides;
+  if (const auto library = choice == kOidnBase ? flat::loadOidn(base.oidnLibrary) : findOidn(base.oidnLibrary)) {
+    guides.push_back({"oidn with prefiltered guides", "Open Image Denoise", oidnGuide(library, true, scratch)});
+    guides.push_back({"oidn", "Open Image Denoise", oidnGuide(library, false, scratch)});
   }
-  std::string name;
-  GuidePlan guide = bestGuide(library, plan, source, scratch, name);
-  notes.insert(
-      fmt::format("{}: bins are guided by {}, which promises less error than the other way", source.path(), name));
-  return guide;
+  if (choice == "auto" && base.name == kAutoBase && hasModel(base))
+    guides.push_back({"the network", "the network", neuralGuide(base, plan, scratch)});
+  std::erase_if(guides, [&](const NamedGuide& guide) {
+    if (choice != "auto" || fits(guide.plan, source, memory)) return false;
+    notes.insert(
+        fmt::format("{}: no guide by {}: whole frames of it take more than the memory", source.path(), guide.who));
+    return true;
+  });
+  if (guides.empty()) return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
+  NamedGuide best = guides.size() > 1 ? bestGuide(std::move(guides), plan, source) : std::move(guides.front());
+  notes.insert(fmt::format("{}: bins are guided by {}, which promises the least error", source.path(), best.name));
+  return std::move(best.plan);
 }
 
 deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, const FrameInputs& inputs,

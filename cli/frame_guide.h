@@ -16,9 +16,11 @@ struct GuidePlan {
   deep::GuideDenoisers denoisers;  // none: FrameInputs::guide is a file that is denoised already
   bool wholeFrame = true;          // else a band of rows can be guided by what is made of that band
   std::string settings;            // all that decides what it makes, as text to be hashed
+  BytesOf bytes = {};              // that its library or network takes beside it
 };
 
-// Bytes that a guide takes: of each pixel while it is made, and of each that is kept for bands of the frame; and its library.
+// Bytes that a guide takes: of each pixel while it is made, and of each that is kept for bands of the frame; and its library
+// or network.
 struct GuideBytes {
   size_t madePerPixel = 0, keptPerPixel = 0, library = 0;
 };
@@ -28,13 +30,14 @@ GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory);
 // Whether frames that offer this say enough of their noise to be guided.
 bool canBeGuided(const deep::DenoiseInputs& inputs);
 
-// The plan for a choice: auto, nlm, oidn, none (then there is none) or a file. `oidn` prefilters its own guides where that
-// promises the smaller error (flat/sure, on the middle of the first frame, `source`). `auto` is Open Image Denoise where it
-// is found: bins and pixels take of it what the noisy frame confirms, and gain even where it is worse than our own filter
-// (fur). Where it is not, our own flat filter for Quality::Best alone: it makes the flattened frame as good as any flat
-// one, for two thirds more time. None for Quality::Fast, for published filters and for frames that say nothing of their
-// noise, nor where Open Image Denoise, which takes whole frames, would need more than `memory` bytes for `source`. Adds to
-// `notes` what it chose. Throws Error where the choice cannot be had.
+// The plan for a choice: auto, nlm, neural, oidn, none (then there is none) or a file. `oidn` prefilters its own guides
+// where that promises the smaller error (cli/method_choice, on the middle of the first frame, `source`). `auto` is Open
+// Image Denoise where it is found: bins and pixels take of it what the noisy frame confirms, and gain even where it is
+// worse than our own filter (fur); where the base is to be chosen (kAutoBase), the network may promise less error and take
+// its place. Where neither is there, our own flat filter for Quality::Best alone: it makes the flattened frame as good as
+// any flat one, for two thirds more time. None for Quality::Fast, for published filters and for frames that say nothing of
+// their noise, nor where one that takes whole frames would need more than `memory` bytes for `source`. Adds to `notes` what
+// it chose. Throws Error where the choice cannot be had.
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t memory, std::set<std::string>& notes);
 

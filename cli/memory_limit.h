@@ -9,6 +9,9 @@ namespace fathom::cli {
 // An image as it is read and in the denoiser's scratch (2), the next one, and the last one as it is written; with errors to
 // estimate, the noisy one, one that is moved along its noise, and two more as that is denoised.
 inline constexpr size_t kImagesInMemory = 4, kImagesWithErrors = 8;
+inline size_t imagesInMemory(bool errors) {
+  return errors ? kImagesWithErrors : kImagesInMemory;
+}
 // The program, its libraries, and what a plan itself takes.
 inline constexpr size_t kProgramBytes = 200'000'000;
 
@@ -26,10 +29,10 @@ inline size_t decodedLimit(size_t memory) {
 }
 
 // Bytes that Open Image Denoise takes beside an image, which it works on in tiles where it is told to stay below
-// decodedLimit. Measured.
-inline size_t oidnBytes(size_t pixels, size_t memory) {
+// `scratch`. Measured.
+inline size_t oidnBytes(size_t pixels, size_t scratch) {
   constexpr size_t kLeast = 400'000'000, kPixel = 700;
-  return std::min(std::max(decodedLimit(memory), kLeast), pixels * kPixel);
+  return std::min(std::max(scratch, kLeast), pixels * kPixel);
 }
 
 }  // namespace fathom::cli

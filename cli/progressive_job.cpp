@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <new>
+#include <optional>
 #include <set>
 
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
 #include "cli/frame_source.h"
+#include "cli/method_choice.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
 #include "deep/noise_response.h"
@@ -23,33 +25,38 @@ namespace fathom::cli {
 
 namespace {
 
-// The mix of the render and what its base makes of it.
-flat::Image mixOf(const ProgressiveRequest& request, const flat::Image& noisy, const flat::Noise& noise,
-                  const Progress& progress) {
-  // The mix has a gate of its own.
-  const deep::DenoisePlan plan = deep::planFlat(noisy, {.quality = request.quality, .gate = false});
-  if (request.probes == 0 && request.base.name == kOwnBase && deep::tellsResponse(plan)) {
+// The mix has a gate of its own.
+deep::DenoisePlan planOf(const ProgressiveRequest& request, const flat::Image& noisy) {
+  return deep::planFlat(noisy, {.quality = request.quality, .gate = false});
+}
+
+// The mix of the render and what its base, our own filter where there is none, makes of it.
+flat::Image mixOf(const ProgressiveRequest& request, const std::optional<BaseDenoiser>& base, const flat::Image& noisy,
+                  const flat::Noise& noise, const Progress& progress) {
+  const deep::DenoisePlan plan = planOf(request, noisy);
+  if (request.probes == 0 && !base && deep::tellsResponse(plan)) {
     deep::FlatAnswer answer = deep::answerNlMeans(noisy, plan, progress);
     return flat::mixByEstimate(noisy, noise, answer.denoised,
                                flat::estimateError(noisy, noise, answer.denoised, std::move(answer.response)));
   }
   flat::ProgressiveParams params;
   if (request.probes > 0) params.sure.probes = request.probes;
-  return flat::denoiseProgressively(noisy, makeBase(request.base, plan, request.memory / 2).denoise, params, progress);
+  return flat::denoiseProgressively(noisy, base ? base->denoise : deep::flatNlMeans(plan), params, progress);
 }
 
-// Our own base is decided by the quality and each image.
-std::string describeBase(const ProgressiveRequest& request) {
-  if (request.base.name == kOwnBase) return kOwnBase;
+// What is the base of all images; none: our own filter, which is decided by the quality and each image.
+std::optional<BaseDenoiser> commonBase(const ProgressiveRequest& request, const BaseOptions& options) {
+  if (options.name == kOwnBase) return {};
   deep::DenoisePlan plan;
   plan.params.quality = request.quality;
-  return makeBase(request.base, plan, request.memory / 2).settings;
+  return makeBase(options, plan, request.memory / 2);
 }
 
 // All that decides what comes out, beside the contents of the inputs.
-std::string describeSettings(const ProgressiveRequest& request, const SourceOptions& source) {
+std::string describeSettings(const ProgressiveRequest& request, const std::optional<BaseDenoiser>& base,
+                             const SourceOptions& source) {
   std::string text = fmt::format("progressive base {} quality {} probes {} errors {} features {} halves {}",
-                                 describeBase(request), int(request.quality), request.probes, request.errors,
+                                 base ? base->settings : kOwnBase, int(request.quality), request.probes, request.errors,
                                  !request.features.empty(), request.halves.size());
   if (source.map)
     for (const ChannelMap::Line& line : source.map->lines) {
@@ -105,11 +112,16 @@ flat::Image outputOf(flat::Image noisy, flat::Image mixed, bool errors) {
 
 class ProgressiveRun {
  public:
-  ProgressiveRun(const ProgressiveRequest& request, ProgressSink& display, const std::stop_token& stop)
+  // `passes`: all that there are, of which the first that can be read decides what is left open.
+  ProgressiveRun(const ProgressiveRequest& request, const std::vector<FrameInputs>& passes, ProgressSink& display,
+                 const std::stop_token& stop)
       : request_(request), display_(display), stop_(stop) {
     if (!request.map.empty()) options_.map = readChannelMap(request.map);
     options_.memory = request.memory;
-    settings_ = describeSettings(request, options_);
+    BaseOptions base = request.base;
+    if (base.name == kAutoBase) base.name = chooseBase(passes);
+    base_ = commonBase(request, base);
+    settings_ = describeSettings(request, base_, options_);
   }
 
   PassReport run(const FrameInputs& inputs, const std::string& output) {
@@ -134,6 +146,23 @@ class ProgressiveRun {
   }
 
  private:
+  std::string chooseBase(const std::vector<FrameInputs>& passes) {
+    for (const FrameInputs& inputs : passes) {
+      flat::Image noisy;
+      try {
+        noisy = read(inputs);
+      } catch (const Error&) {
+        continue;  // its own run tells
+      }
+      const flat::Image middle = flat::crop(noisy, middleOf(noisy.dataWindow));
+      const MethodChoice choice =
+          chooseMethod(request_.base, middle, planOf(request_, noisy), {.scratch = request_.memory / 2});
+      display_.tell(fmt::format("{}: denoised by {}, which {}", inputs.main, choice.name, choice.why));
+      return choice.name;
+    }
+    return kOwnBase;
+  }
+
   void work(const FrameInputs& inputs, PassReport& report) {
     ContentHash hash;
     for (const std::string& text : {std::string(FATHOM_VERSION), settings_}) hash.add(text);
@@ -152,7 +181,7 @@ class ProgressiveRun {
     flat::Image noisy = read(inputs);
     const flat::Noise noise = flat::noiseOf(noisy);
     const Progress progress{[&](double done) { display_.at(done); }, stop_};
-    flat::Image mixed = mixOf(request_, noisy, noise, progress);
+    flat::Image mixed = mixOf(request_, base_, noisy, noise, progress);
     report.errors = flat::summarizeErrors(mixed, noise);
     report.spp = flat::sppOf(noisy);
     if (standing == Standing::Ours) return;
@@ -178,6 +207,7 @@ class ProgressiveRun {
   ProgressSink& display_;
   const std::stop_token stop_;
   SourceOptions options_;
+  std::optional<BaseDenoiser> base_;
   std::string settings_;
   std::set<std::string> told_;
 };
@@ -189,7 +219,10 @@ std::vector<PassReport> runProgressive(const ProgressiveRequest& request, const 
                                        const std::function<void(const PassReport&)>& done) {
   const FilePattern output = outputPattern(request, sequence.pattern);
   for (const int frame : sequence.frames) expectOtherThan(inputsAt(request, sequence.pattern, frame), output.at(frame));
-  ProgressiveRun run(request, display, stop);
+  std::vector<FrameInputs> passes;
+  for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
+    passes.push_back(inputsAt(request, sequence.pattern, frame));
+  ProgressiveRun run(request, passes, display, stop);
   std::vector<PassReport> reports;
   for (const int frame : sequence.frames) {
     if (stop.stop_requested()) throw Cancelled();

@@ -1,6 +1,5 @@
 #include "deep/apply_flat.h"
 
-#include <array>
 #include <chrono>
 #include <string>
 #include <utility>
@@ -13,11 +12,10 @@ namespace fathom::deep {
 
 namespace {
 
-constexpr std::array<const char*, 3> kRgb{"R", "G", "B"};
-
 // The pixels as a flat image; the channels are left without values.
 flat::Image takeFlat(DeepImage& image) {
   flat::Image result{image.dataWindow, image.displayWindow, {}, {}};
+  if (const auto spp = image.attributes.getInt("fathom:spp")) result.attributes["fathom:spp"] = std::to_string(*spp);
   for (Channel& channel : image.channels)
     result.planes.push_back({channel.name, std::exchange(channel.values, Buffer<float>())});
   return result;
@@ -43,9 +41,6 @@ bool isComponent(const std::string& name) {
 DeepImage applyFlat(DeepImage image, const flat::Denoiser& denoiser, bool keepStatistics, const Progress& progress,
                     DenoiseStats* stats) {
   const auto start = std::chrono::steady_clock::now();
-  std::erase_if(image.channels, [&](const Channel& c) {
-    return isComponent(c.name) || (!keepStatistics && describesSamples(roleOf(c)));
-  });
   unmakeOneBin(image);
   flat::Image pixels = takeFlat(image);
   flat::Image denoised = denoiser(pixels, progress);
@@ -53,8 +48,12 @@ DeepImage applyFlat(DeepImage image, const flat::Denoiser& denoiser, bool keepSt
     stats->counts["pixels"] += image.pixels();
     stats->counts["non-finite samples"] += countNonFinitePixels(pixels);
   }
-  for (const char* name : kRgb) pixels.find(name)->values = std::move(denoised.find(name)->values);
+  for (flat::Plane& plane : denoised.planes)
+    if (flat::Plane* to = pixels.find(plane.name)) to->values = std::move(plane.values);
   giveBack(image, pixels);
+  std::erase_if(image.channels, [&](const Channel& c) {
+    return (isComponent(c.name) && !denoised.find(c.name)) || (!keepStatistics && describesSamples(roleOf(c)));
+  });
   makeOneBin(image);
   if (stats) stats->seconds["base"] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return image;

@@ -29,6 +29,10 @@ struct HalfChannel {
   float at(size_t i) const { return whole ? whole->values[i] : diffuse->values[i] + specular->values[i]; }
 };
 
+bool hasVariances(const Image& image) {
+  return image.find("variance.R") && image.find("variance.G") && image.find("variance.B");
+}
+
 void fromHalves(const Image& image, Noise& noise) {
   const Plane *n0 = image.find("half0.samples"), *n1 = image.find("half1.samples");
   for (size_t c = 0; c < 3; ++c) {
@@ -81,6 +85,13 @@ int sppOf(const Image& image) {
   return std::from_chars(text.data(), text.data() + text.size(), spp).ec == std::errc() && spp > 0 ? spp : 0;
 }
 
+bool tellsNoise(const Image& image) {
+  if (hasVariances(image)) return true;
+  return std::ranges::all_of(kRgbNames, [&](const char* name) {
+    return HalfChannel(image, "half0.", name).there() && HalfChannel(image, "half1.", name).there();
+  });
+}
+
 Noise noiseOf(const Image& image) {
   const size_t pixels = image.dataWindow.area();
   const std::array<const Plane*, 3> colour{&image.get("R"), &image.get("G"), &image.get("B")};
@@ -88,7 +99,7 @@ Noise noiseOf(const Image& image) {
   noise.level = meanOf(colour);
   noise.pixel = Buffer<PixelNoise>(pixels);
   noise.samples = Buffer<float>(pixels, 1.0f);
-  const bool variances = image.find("variance.R") && image.find("variance.G") && image.find("variance.B");
+  const bool variances = hasVariances(image);
   for (size_t c = 0; c < 3; ++c)
     noise.variance[c] =
         variances ? image.get(std::string("variance.") + kRgbNames[c]).values.copy() : Buffer<float>(pixels);

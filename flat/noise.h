@@ -30,6 +30,9 @@ struct Noise {
 // The attribute fathom:spp; 0: the image does not tell.
 int sppOf(const Image& image);
 
+// Whether an image says anything of its noise.
+bool tellsNoise(const Image& image);
+
 // From variance.{R,G,B}, else the two-buffer variance n0 n1 / (n0 + n1)^2 (m0 - m1)^2 of half0.* and half1.* (R G B, or
 // the sum of diffuse.* and specular.*). Counts are those of `samples`, else the attribute fathom:spp; where neither is
 // there, a variance of 0 counts as known to be 0. Throws Error where the image has no R G B or says nothing of its

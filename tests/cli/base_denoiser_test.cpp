@@ -59,7 +59,7 @@ TEST(BaseDenoiser, NlmIsFlatNlMeans) {
 
 TEST(BaseDenoiser, ALibraryThatIsNotThereIsOneLine) {
   const Folder folder;
-  const Ran outcome = folder.run("in.exr -o out.exr --base oidn --oidn-library /nowhere");
+  const Ran outcome = folder.run("in.exr -o out.exr --method oidn --oidn-library /nowhere");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("/nowhere: expected Open Image Denoise"));
   EXPECT_EQ(lines(outcome.err), 1) << outcome.err;
@@ -68,17 +68,17 @@ TEST(BaseDenoiser, ALibraryThatIsNotThereIsOneLine) {
 
 TEST(BaseDenoiser, WhatItCannotDoIsUsage) {
   const Folder folder;
-  const Ran outcome = folder.run("in.exr -o out.exr --base oidn --components");
+  const Ran outcome = folder.run("in.exr -o out.exr --method oidn --split");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("--components"));
-  EXPECT_EQ(folder.run("in.exr -o out.exr --base other").status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--split"));
+  EXPECT_EQ(folder.run("in.exr -o out.exr --method other").status, 2);
 }
 
 // A deep frame is guided by it: --flat-guide oidn.
 TEST(BaseDenoiser, OfDeepFramesItIsTheGuide) {
   const Folder folder;
   deep::write(folder / "deep.exr", makeNoisyFrame(24, 20, 1));
-  for (const char* option : {"--base", "--flat-guide"}) {
+  for (const char* option : {"--method", "--base", "--flat-guide"}) {
     const Ran outcome =
         folder.run(fmt::format("deep.exr -o out.exr {} oidn --oidn-library {}", option, fakeOidn("fake_oidn_failing")));
     EXPECT_EQ(outcome.status, 1);
@@ -143,7 +143,7 @@ TEST_F(WithOidnDenoise, ASequenceOfFlatFrames) {
     std::erase_if(image.planes, [](const flat::Plane& plane) { return plane.name.starts_with("N."); });
     flat::write(folder / fmt::format("in.{}.exr", frame), image);
   }
-  const Ran outcome = folder.run("in.#.exr -o out.#.exr --base oidn --quality fast --oidn-library " + kOidn);
+  const Ran outcome = folder.run("in.#.exr -o out.#.exr --method oidn --quality fast --oidn-library " + kOidn);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("no N.*: the albedo guides alone"));
   for (const int frame : {1, 2, 3}) EXPECT_TRUE(folder.exists(fmt::format("out.{}.exr", frame)));

@@ -108,10 +108,10 @@ TEST(TimeBudget, AGuideOfAFileCostsNothing) {
 
 TEST(TimeBudget, SettingsAreOptionsAndReadBack) {
   EXPECT_EQ(cli::describeSetting({Quality::Best, true, "nlm"}), "--quality best --flat-guide nlm");
-  EXPECT_EQ(cli::describeSetting({Quality::Fast, false, "oidn"}), "--quality fast --base oidn");
+  EXPECT_EQ(cli::describeSetting({Quality::Fast, false, "oidn"}), "--quality fast --method oidn");
   for (const SettingCost& cost : cli::measuredCosts())
     EXPECT_EQ(cli::parseSetting(describeSetting(cost.setting)), cost.setting);
-  for (const char* text : {"", "--quality best", "--quality best --flat-guide nlm ", "--quality worst --base nlm"})
+  for (const char* text : {"", "--quality best", "--quality best --flat-guide nlm ", "--quality worst --method nlm"})
     EXPECT_FALSE(cli::parseSetting(text)) << text;
 }
 
@@ -151,10 +151,10 @@ TEST(DenoiseBudget, WhatTheOptionsLeaveOpen) {
 
 TEST(DenoiseBudget, FlatFramesKeepTheBaseThatIsNamed) {
   Planned planned(false);
-  EXPECT_EQ(planned.choice(), "--quality best --base nlm");
+  EXPECT_EQ(planned.choice(), "--quality best --method nlm");
   planned.request.base.name = "oidn";
   planned.request.anyBase = false;
-  EXPECT_THAT(planned.choice(), HasSubstr("--base oidn"));
+  EXPECT_THAT(planned.choice(), HasSubstr("--method oidn"));
 }
 
 TEST(DenoiseBudget, ASettingIsARequestAndNothingElse) {
@@ -250,7 +250,7 @@ TEST_F(DenoiseWithBudget, OutputsOfOthersAreRefusedAsEver) {
 TEST_F(DenoiseWithBudget, FlatFramesSayItToo) {
   flat::write(folder_ / "flat.exr", deep::flatten(makeNoisyFrame(24, 20, 1)));
   ASSERT_EQ(run("flat.exr -o out.exr --time-budget 0.000001").status, 0);
-  EXPECT_EQ(record("out.exr"), (cli::BudgetRecord{"1e-06 s", "--quality fast --base nlm"}));
+  EXPECT_EQ(record("out.exr"), (cli::BudgetRecord{"1e-06 s", "--quality fast --method nlm"}));
   EXPECT_THAT(run("flat.exr -o out.exr --time-budget 1000").out, HasSubstr("done before"));
 }
 

@@ -137,7 +137,7 @@ TEST_F(Denoise, FlatIsTheFlattenedOutput) {
 
 TEST_F(Denoise, ComponentsGetFilesOfTheirOwn) {
   writeFrames(1);
-  ASSERT_EQ(run("in.####.exr -o out.####.exr --components").status, 0);
+  ASSERT_EQ(run("in.####.exr -o out.####.exr --split").status, 0);
   const DeepImage out = deep::read(folder_ / "out.0001.exr"), diffuse = deep::read(folder_ / "out.diffuse.0001.exr");
   EXPECT_TRUE(exists("out.specular.0001.exr"));
   EXPECT_FALSE(diffuse.find("diffuse.R") || diffuse.find("specular.R"));
@@ -149,7 +149,7 @@ TEST_F(Denoise, ComponentsThatAreNotThereAreAnError) {
   DeepImage image = makeNoisyFrame(8, 8, 1);
   for (const char* channel : {"R", "G", "B"}) image.erase(std::string("diffuse.") + channel);
   deep::write(folder_ / "in.exr", image);
-  const Ran outcome = run("in.exr -o out.exr --components");
+  const Ran outcome = run("in.exr -o out.exr --split");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("in.exr: expected diffuse.* and specular.*"));
 }

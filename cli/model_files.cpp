@@ -1,0 +1,90 @@
+#include "cli/model_files.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <set>
+
+#include "cli/content_hash.h"
+#include "flat/error.h"
+#include "nn/weights.h"
+
+namespace fathom::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kVariable = "FATHOM_MODELS";
+constexpr const char* kSuffix = ".safetensors";
+
+std::string textOf(const nn::WeightFile& file, const std::string& key) {
+  const auto found = file.metadata.find(key);
+  return found == file.metadata.end() ? std::string() : printable(found->second);
+}
+
+// The file of an installed model; empty where there is none.
+std::string installed(const std::string& name) {
+  for (const std::string& path : findModels())
+    if (fs::path(path).stem() == name) return path;
+  return {};
+}
+
+std::string pathOf(const std::string& model) {
+  if (model.find('/') != std::string::npos || model.ends_with(kSuffix)) return model;
+  if (std::string path = installed(model); !path.empty()) return path;
+  fail("--model {}: expected {}{} in {}, or the name of a file that ends so; found none", model, model, kSuffix,
+       fmt::join(modelFolders(), " or "));
+}
+
+}  // namespace
+
+std::vector<std::string> modelFolders() {
+  if (const char* folder = std::getenv(kVariable); folder && *folder) return {folder};
+  std::error_code none;
+  std::vector<std::string> folders;
+  const fs::path program = fs::read_symlink("/proc/self/exe", none);
+  if (!none) folders.push_back((program.parent_path().parent_path() / "share/fathom/models").string());
+  folders.emplace_back(FATHOM_SOURCE_MODELS);
+  return folders;
+}
+
+std::vector<std::string> findModels() {
+  std::vector<std::string> result;
+  std::set<std::string> names;
+  for (const std::string& folder : modelFolders()) {
+    std::error_code none;
+    std::vector<fs::path> files;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, none))
+      if (entry.path().extension() == kSuffix) files.push_back(entry.path());
+    std::ranges::sort(files);
+    for (const fs::path& file : files)
+      if (names.insert(file.stem().string()).second) result.push_back(file.string());
+  }
+  return result;
+}
+
+Model loadModel(const std::string& model) {
+  Model result;
+  result.path = pathOf(model);
+  const nn::WeightFile file = nn::readWeights(result.path);
+  result.net = std::make_shared<nn::CompositionalNet>(file);
+  for (const auto& [name, tensor] : file.tensors) result.parameters += tensor.values.size();
+  result.name = textOf(file, "name");
+  result.steps = textOf(file, "steps");
+  result.licence = textOf(file, "licence");
+  ContentHash hash;
+  hash.addFile(result.path);
+  result.settings = fmt::format("network {:016x}", hash.value());
+  return result;
+}
+
+std::string defaultModel(bool best) {
+  for (const char* name : {best ? "base" : "small", best ? "small" : "base"})
+    if (!installed(name).empty()) return name;
+  return {};
+}
+
+}  // namespace fathom::cli

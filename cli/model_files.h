@@ -1,0 +1,34 @@
+// The networks that are installed: weight files by name, and what commands need of them.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "nn/compositional.h"
+
+namespace fathom::cli {
+
+// The folders where models are looked for, in this order: FATHOM_MODELS alone where that is set; else the one that is
+// installed with the program, and the source tree's.
+std::vector<std::string> modelFolders();
+
+// The weight files in them, by their names; of two with the same name the first.
+std::vector<std::string> findModels();
+
+struct Model {
+  std::string path;
+  std::shared_ptr<const nn::CompositionalNet> net;
+  size_t parameters = 0;
+  std::string name, steps, licence;  // as the file says, "" where it does not
+  std::string settings;              // tells its content, to be hashed
+};
+
+// `model`: a name that findModels finds (small, base), or a file. Throws Error where it cannot be had.
+Model loadModel(const std::string& model);
+
+// The model that is meant where none is named: base for `best`, else small; where that is not installed, the other. Empty
+// where neither is.
+std::string defaultModel(bool best);
+
+}  // namespace fathom::cli

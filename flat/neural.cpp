@@ -1,0 +1,150 @@
+#include "flat/neural.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "flat/finite.h"
+#include "flat/neural_planes.h"
+#include "flat/noise.h"
+#include "flat/parallel.h"
+#include "nn/tiles.h"
+
+namespace fathom::flat {
+
+namespace {
+
+// Of a pixel: the planes, the colour and the network's result; ours, of three lights; and what is known of the noise.
+constexpr size_t kPixelBytes = (nn::kInputPlanes + 3 + 3 + 9) * sizeof(float) + 20;
+constexpr int kLargestTile = 512, kSmallestTile = 64;  // of nn/tiles
+
+int mostComponents(const NeuralParams& params) {
+  return params.components > 0 ? params.components : kAutoComponents;
+}
+
+// 1 where the render stays: it has converged, or there is nothing.
+Buffer<uint8_t> settledPixels(const Image& image) {
+  const size_t pixels = image.dataWindow.area();
+  Buffer<uint8_t> settled(pixels, 0);
+  if (tellsNoise(image)) {
+    const Noise noise = noiseOf(image);
+    for (size_t i = 0; i < pixels; ++i) settled[i] = noise.pixel[i] == PixelNoise::Converged;
+  }
+  const Plane* alpha = image.find("A");
+  if (!alpha) return settled;
+  const std::array<const float*, 3> rgb{image.get("R").values.data(), image.get("G").values.data(),
+                                        image.get("B").values.data()};
+  for (size_t i = 0; i < pixels; ++i)
+    if (alpha->values[i] == 0 && rgb[0][i] == 0 && rgb[1][i] == 0 && rgb[2][i] == 0) settled[i] = 1;
+  return settled;
+}
+
+bool anyUnsettled(const Buffer<uint8_t>& settled, const Box& window, const nn::Window& tile) {
+  const int x1 = std::min(tile.x + tile.width, window.width()), y1 = std::min(tile.y + tile.height, window.height());
+  for (int y = tile.y; y < y1; ++y) {
+    const uint8_t* row = settled.data() + size_t(y) * size_t(window.width());
+    if (std::any_of(row + tile.x, row + x1, [](uint8_t s) { return s == 0; })) return true;
+  }
+  return false;
+}
+
+float clean(float value) {
+  return std::max(finiteOrZero(value), 0.0f);
+}
+
+// One light through the network, into planes of the result.
+class LightRun {
+ public:
+  LightRun(const nn::CompositionalNet& net, const NeuralParams& params, const Image& noisy, NeuralCounts* counts)
+      : net_(net), params_(params), noisy_(noisy), counts_(counts), settled_(settledPixels(noisy)), planes_(noisy) {}
+
+  void run(Light light, const Progress& progress, Image& result) {
+    planes_.select(light);
+    Buffer<float> out(3 * size_t(planes_.height()) * size_t(planes_.width()), 0.0f);
+    nn::denoiseTiles(
+        net_, planes_.input(), mostComponents(params_), [&](const nn::Window& tile) { return componentsOf(tile); },
+        nn::denseRows(out.data(), 3, planes_.height(), planes_.width()), {.memory = params_.memory}, progress);
+    for (size_t c = 0; c < 3; ++c) {
+      const std::string name = prefixOf(light) + kRgbNames[c];
+      take(out.data() + c * size_t(planes_.height()) * size_t(planes_.width()), noisy_.get(name).values,
+           result.add(name).values);
+    }
+  }
+
+  // The whole light from its two parts, but for what is settled.
+  void add(Image& result) const {
+    for (const char* c : kRgbNames) {
+      Buffer<float> sum(settled_.size());
+      const Buffer<float>&diffuse = result.get(prefixOf(Light::Diffuse) + c).values,
+            &specular = result.get(prefixOf(Light::Specular) + c).values, &render = noisy_.get(c).values;
+      for (size_t i = 0; i < sum.size(); ++i) sum[i] = settled_[i] ? clean(render[i]) : diffuse[i] + specular[i];
+      result.planes.push_back({c, std::move(sum)});
+    }
+  }
+
+ private:
+  int componentsOf(const nn::Window& tile) const {
+    const bool worth = anyUnsettled(settled_, noisy_.dataWindow, tile);
+    if (counts_) (worth ? counts_->denoised : counts_->skipped) += uint64_t(tile.width) * uint64_t(tile.height);
+    return worth ? mostComponents(params_) : 0;
+  }
+
+  // Out of the network's exposure.
+  void take(const float* exposed, const Buffer<float>& render, Buffer<float>& to) const {
+    const int width = noisy_.dataWindow.width();
+    parallelFor(0, noisy_.dataWindow.height(), [&](int y) {
+      const float* from = exposed + size_t(y) * size_t(planes_.width());
+      for (size_t x = 0; x < size_t(width); ++x) {
+        const size_t i = size_t(y) * size_t(width) + x;
+        to[i] = clean(settled_[i] ? render[i] : from[x] / planes_.exposure());
+      }
+    });
+  }
+
+  const nn::CompositionalNet& net_;
+  const NeuralParams& params_;
+  const Image& noisy_;
+  NeuralCounts* counts_;
+  const Buffer<uint8_t> settled_;
+  NeuralPlanes planes_;
+};
+
+}  // namespace
+
+Image denoiseNeural(const nn::CompositionalNet& net, const NeuralParams& params, const Image& noisy,
+                    const Progress& progress, NeuralCounts* counts) {
+  progress.at(0);
+  Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
+  LightRun light(net, params, noisy, counts);
+  const bool apart = hasLight(noisy, Light::Diffuse) && hasLight(noisy, Light::Specular);
+  if (!apart) {
+    light.run(Light::Whole, progress, result);
+    return result;
+  }
+  light.run(Light::Diffuse, {[&](double done) { progress.at(done / 2); }, progress.stop}, result);
+  light.run(Light::Specular, {[&](double done) { progress.at((1 + done) / 2); }, progress.stop}, result);
+  light.add(result);
+  return result;
+}
+
+Denoiser neural(std::shared_ptr<const nn::CompositionalNet> net, const NeuralParams& params,
+                std::shared_ptr<NeuralCounts> counts) {
+  return [net = std::move(net), params, counts = std::move(counts)](const Image& noisy, const Progress& progress) {
+    return denoiseNeural(*net, params, noisy, progress, counts.get());
+  };
+}
+
+size_t neuralBytes(const nn::CompositionalNet& net, const NeuralParams& params, size_t pixels) {
+  const int components = mostComponents(params);
+  const double halo = 2.0 * net.halo(components), perPixel = net.bytesPerPixel(components);
+  const double least = perPixel * (kSmallestTile + halo) * (kSmallestTile + halo);
+  const double grown = (kLargestTile + halo) / kLargestTile;
+  // At most all tiles are worked on at once, each with its halo as far as there is a frame.
+  const double work = perPixel * grown * grown * double(pixels);
+  return pixels * kPixelBytes + size_t(params.memory ? std::min(work, std::max(double(params.memory), least)) : work);
+}
+
+}  // namespace fathom::flat

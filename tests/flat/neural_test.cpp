@@ -1,0 +1,185 @@
+#include "flat/neural.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <limits>
+
+#include "flat/finite.h"
+#include "flat/neural_planes.h"
+#include "tests/reference/compositional.h"
+#include "tests/reference/noisy_flat.h"
+
+namespace fathom::flat {
+namespace {
+
+using reference::makeNoisyFlat;
+
+const nn::CompositionalNet& net() {
+  static const nn::CompositionalNet made(
+      nn::readWeights(reference::safetensors(reference::randomCompositional(16, 7)), "random"));
+  return made;
+}
+
+Image withAlpha(Image image) {
+  image.add("A", 1);
+  image.add("Z", 3);
+  return image;
+}
+
+Image withoutComponents(Image image) {
+  std::erase_if(image.planes, [](const Plane& plane) {
+    return plane.name.find("diffuse.") != std::string::npos || plane.name.find("specular.") != std::string::npos;
+  });
+  return image;
+}
+
+// The greatest difference, by the greatest value.
+double difference(const Image& a, const Image& b, double scale = 1) {
+  double most = 0, largest = 0;
+  for (const Plane& plane : a.planes)
+    for (size_t i = 0; i < plane.values.size(); ++i) {
+      const double e = double(plane.values[i]), f = double(b.get(plane.name).values[i]) / scale;
+      most = std::max(most, std::abs(e - f));
+      largest = std::max(largest, std::abs(e));
+    }
+  return most / largest;
+}
+
+bool same(const Image& a, const Image& b) {
+  return difference(a, b) == 0;
+}
+
+// Against the network itself, on planes that are made here.
+TEST(Neural, IsTheNetworkOutOfItsExposure) {
+  const Image noisy = withoutComponents(withAlpha(makeNoisyFlat(22, 14, 1).noisy));
+  NeuralPlanes planes(noisy);
+  planes.select(Light::Whole);
+  std::vector<float> expected(3 * 24 * 16);
+  nn::CompositionalNet::Workspace workspace;
+  for (const int components : {1, 2, 4}) {
+    net().denoise(planes.input(), {0, 0, 24, 16}, components, nn::denseRows(expected.data(), 3, 16, 24), workspace);
+    const Image found = denoiseNeural(net(), {.components = components}, noisy);
+    ASSERT_EQ(found.planes.size(), 3U);
+    EXPECT_EQ(found.dataWindow, noisy.dataWindow);
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t y = 0; y < 14; ++y)
+        for (size_t x = 0; x < 22; ++x)
+          ASSERT_FLOAT_EQ(found.get(kRgbNames[c]).values[y * 22 + x],
+                          expected[(c * 16 + y) * 24 + x] / planes.exposure());
+  }
+}
+
+TEST(Neural, ComponentsAddUp) {
+  const Image found = denoiseNeural(net(), {}, withAlpha(makeNoisyFlat(20, 16, 2).noisy));
+  ASSERT_EQ(found.planes.size(), 9U);
+  for (const std::string c : kRgbNames)
+    for (size_t i = 0; i < found.dataWindow.area(); ++i)
+      ASSERT_EQ(found.get(c).values[i], found.get("diffuse." + c).values[i] + found.get("specular." + c).values[i]);
+}
+
+TEST(Neural, AScaledFrameIsDenoisedAlike) {
+  const Image noisy = withAlpha(makeNoisyFlat(36, 28, 3).noisy);
+  const Image expected = denoiseNeural(net(), {.components = 2}, noisy);
+  for (const float scale : {1e-6f, 0.3f, 64.0f, 7e4f}) {
+    Image scaled = noisy.copy();
+    for (Plane& plane : scaled.planes) {
+      const bool variance = plane.name.starts_with("variance.");
+      const bool light = plane.name != "A" && plane.name != "Z" && !plane.name.ends_with("samples");
+      for (float& v : plane.values) v *= variance ? scale * scale : light ? scale : 1;
+    }
+    EXPECT_LT(difference(expected, denoiseNeural(net(), {.components = 2}, scaled), double(scale)), 1e-4) << scale;
+  }
+}
+
+TEST(Neural, SameBitsForAnyNumberOfThreads) {
+  const Image noisy = withAlpha(makeNoisyFlat(300, 200, 4).noisy);
+  const NeuralParams params{.components = 2, .memory = 20'000'000};  // in several tiles
+  const Image expected = denoiseNeural(net(), params, noisy);
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_TRUE(same(expected, denoiseNeural(net(), params, noisy)));
+}
+
+TEST(Neural, ConvergedAndEmptyPixelsKeepTheRender) {
+  Image noisy = withAlpha(makeNoisyFlat(40, 24, 5).noisy);
+  for (const size_t i : {5U, 410U})
+    for (const std::string c : kRgbNames) noisy.find("variance." + c)->values[i] = 0;
+  for (Plane& plane : noisy.planes) plane.values[100] = 0;
+  const Image found = denoiseNeural(net(), {}, noisy);
+  for (const std::string c : kRgbNames) {
+    for (const size_t i : {5U, 410U}) {
+      EXPECT_EQ(found.get(c).values[i], noisy.get(c).values[i]);
+      EXPECT_EQ(found.get("diffuse." + c).values[i], noisy.get("diffuse." + c).values[i]);
+    }
+    EXPECT_EQ(found.get(c).values[100], 0);
+    EXPECT_NE(found.get(c).values[6], noisy.get(c).values[6]);
+  }
+}
+
+// Skipped tiles change nothing but the time.
+TEST(Neural, TilesWithoutNoiseAreSkipped) {
+  const Image noisy = withAlpha(makeNoisyFlat(512, 64, 6).noisy);
+  Image half = noisy.copy();
+  for (const std::string c : kRgbNames)
+    for (size_t i = 0; i < 512U * 64; ++i)
+      if (i % 512 >= 200) half.find("variance." + c)->values[i] = 0;
+  NeuralCounts all, fewer;
+  const NeuralParams params{.components = 1, .memory = 1};  // the smallest tiles
+  denoiseNeural(net(), params, noisy, {}, &all);
+  EXPECT_EQ(all.denoised, 2U * 512 * 64);
+  EXPECT_EQ(all.skipped, 0U);
+  const Image cut = denoiseNeural(net(), params, half, {}, &fewer);
+  EXPECT_EQ(fewer.denoised + fewer.skipped, 2U * 512 * 64);
+  EXPECT_EQ(fewer.skipped, 2U * 256 * 64);
+  NeuralCounts none;
+  const Image whole = denoiseNeural(net(), {.components = 1}, half, {}, &none);
+  EXPECT_EQ(none.skipped, 0U);
+  EXPECT_LT(difference(whole, cut), 1e-5);
+}
+
+TEST(Neural, OddValuesNeverSpread) {
+  constexpr float kOdd[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e30f,
+                            1e14f, -5};
+  Image noisy = withAlpha(makeNoisyFlat(33, 21, 8).noisy);
+  size_t at = 0;
+  for (Plane& plane : noisy.planes)
+    for (const float odd : kOdd) plane.values[(at += 37) % plane.values.size()] = odd;
+  for (const Image& image : {noisy.copy(), withoutComponents(noisy.copy())})
+    for (const Plane& plane : denoiseNeural(net(), {.components = 4}, image).planes)
+      for (const float v : plane.values) ASSERT_TRUE(isFinite(v) && v >= 0) << plane.name << " " << v;
+}
+
+TEST(Neural, TheColourAloneIsEnough) {
+  Image bare{{0, 0, 5, 3}, {0, 0, 5, 3}, {}, {}};
+  for (const char* name : kRgbNames) bare.add(name, 0.5f);
+  for (const Plane& plane : denoiseNeural(net(), {}, bare).planes)
+    for (const float v : plane.values) EXPECT_NEAR(v, 0.5f, 1e-5f);
+  EXPECT_EQ(denoiseNeural(net(), {}, crop(bare, {})).planes.size(), 3U);
+}
+
+TEST(Neural, StopsAndTellsItsProgress) {
+  const Image noisy = withAlpha(makeNoisyFlat(64, 48, 9).noisy);
+  double last = 0;
+  denoiseNeural(net(), {}, noisy,
+                {[&](double done) {
+                   EXPECT_GE(done, last);
+                   last = done;
+                 },
+                 {}});
+  EXPECT_EQ(last, 1);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(denoiseNeural(net(), {}, noisy, {{}, stop.get_token()}), Cancelled);
+}
+
+TEST(Neural, MemoryIsCounted) {
+  const size_t pixels = 2'000'000;
+  const size_t free = neuralBytes(net(), {.components = 4}, pixels);
+  EXPECT_GT(free, pixels * 500);
+  EXPECT_LT(neuralBytes(net(), {.components = 4, .memory = 50'000'000}, pixels), free / 2);
+  EXPECT_LT(neuralBytes(net(), {.components = 1}, pixels), free);
+}
+
+}  // namespace
+}  // namespace fathom::flat
