@@ -4,11 +4,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <utility>
 
 #include "cli/memory_limit.h"
 #include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
 #include "flat/error.h"
+#include "flat/gate.h"
 #include "flat/neural.h"
 #include "flat/oidn.h"
 
@@ -102,9 +104,16 @@ std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path) {
 }
 
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
-  if (options.name == kOidnBase) return oidnBase(options, plan.params.quality, scratch);
-  if (options.name == kNeuralBase) return neuralBase(options, plan.params.quality, scratch);
-  return {.denoise = deep::flatNlMeans(plan), .settings = describeFilter(plan)};
+  if (options.name != kOidnBase && options.name != kNeuralBase)
+    return {.denoise = deep::flatNlMeans(plan), .settings = describeFilter(plan)};
+  const bool oidn = options.name == kOidnBase;
+  BaseDenoiser base =
+      oidn ? oidnBase(options, plan.params.quality, scratch) : neuralBase(options, plan.params.quality, scratch);
+  if (!plan.params.gate) return base;
+  base.denoise = flat::withGate(std::move(base.denoise));
+  base.settings += " gated";
+  base.readsStatistics = true;
+  return base;
 }
 
 bool hasModel(const BaseOptions& options) {

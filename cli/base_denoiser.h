@@ -49,7 +49,7 @@ struct BaseDenoiser {
 
 // The denoiser of that name, which is not kAutoBase. `plan`: that of flat frames (deep::planFlat), whose quality chooses the
 // method of oidn, too: Fast its fast network with the guides as they are, else its best one with guides denoised first; and
-// the model of neural, where none is named. `scratch`: bytes that a library or network may use beside the images. Throws
+// the model of neural, where none is named; with its gate, if that is on. `scratch`: bytes that a library or network may use beside the images. Throws
 // Error where its library or its model is not found.
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch);
 

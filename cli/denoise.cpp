@@ -163,7 +163,7 @@ void addDenoise(CLI::App& app) {
   sub->add_flag("--error", command->request.errors,
                 "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "
                 "flattened ones (three times the work; none for flat frames with half buffers and --method nlm)");
-  sub->add_flag("--no-gate", command->noGate, "The filter alone, which lets some light bleed between bins");
+  sub->add_flag("--no-gate", command->noGate, "The denoiser alone: what it damages is not taken back");
   sub->add_flag("--keep", command->keep, "Keep half buffers, variances and counts in OUT");
   option("--frames", command->frames, "RANGE", "1-100, 1-100x2 or 1,3,5-9 (default: all that are on disk)")
       ->check(understood(parseFrames));

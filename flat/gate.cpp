@@ -33,6 +33,12 @@ Buffer<GateSample> samplesOf(const Image& noisy, const Noise& noise, const Image
   return samples;
 }
 
+// f + k (y - f).
+void takeBack(const Buffer<float>& k, const Buffer<float>& y, Buffer<float>& f) {
+  for (size_t i = 0; i < f.size(); ++i)
+    if (k[i] > 0 && isFinite(y[i])) f[i] += k[i] * (y[i] - f[i]);
+}
+
 }  // namespace
 
 Buffer<float> gate(const Image& noisy, const Noise& noise, const Image& denoised, const GateParams& params) {
@@ -60,11 +66,22 @@ Image gated(const Image& noisy, const Noise& noise, const Image& denoised, const
   const Buffer<float> k = gate(noisy, noise, denoised, params);
   Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
   for (const char* name : kRgbNames) {
-    const Buffer<float>&y = noisy.get(name).values, &f = denoised.get(name).values;
     Buffer<float>& values = result.add(name).values;
-    for (size_t i = 0; i < values.size(); ++i) values[i] = k[i] > 0 ? f[i] + k[i] * (y[i] - f[i]) : f[i];
+    values = denoised.get(name).values.copy();
+    takeBack(k, noisy.get(name).values, values);
   }
   return result;
+}
+
+Denoiser withGate(Denoiser denoiser, const GateParams& params) {
+  return [denoiser = std::move(denoiser), params](const Image& noisy, const Progress& progress) {
+    Image result = denoiser(noisy, progress);
+    if (!tellsNoise(noisy)) return result;
+    const Buffer<float> k = gate(noisy, noiseOf(noisy), result, params);
+    for (Plane& plane : result.planes)
+      if (const Plane* y = noisy.find(plane.name)) takeBack(k, y->values, plane.values);
+    return result;
+  };
 }
 
 }  // namespace fathom::flat

@@ -5,6 +5,7 @@
 // results of Open Image Denoise up to 3 %, and both take 2 % off on average (docs/notes.md).
 #pragma once
 
+#include "flat/denoiser.h"
 #include "flat/noise.h"
 
 namespace fathom::flat {
@@ -19,5 +20,9 @@ Buffer<float> gate(const Image& noisy, const Noise& noise, const Image& denoised
 
 // The gated R, G and B.
 Image gated(const Image& noisy, const Noise& noise, const Image& denoised, const GateParams& params = {});
+
+// The denoiser with the gate behind it, which R, G and B decide for its components, too. What says nothing of its noise it
+// leaves as it is.
+Denoiser withGate(Denoiser denoiser, const GateParams& params = {});
 
 }  // namespace fathom::flat

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
 
 #include "tests/reference/flat_gate.h"
 #include "tests/reference/noisy_flat.h"
@@ -60,6 +62,41 @@ TEST(FlatGate, GivesTheRenderWhereThereIsNoNoise) {
   const Image result = gated(frame.noisy, noiseOf(frame.noisy), damaged(frame, 0.3f));
   for (const char* c : kRgbNames)
     for (size_t i = 0; i < 200; ++i) EXPECT_NEAR(result.get(c).values[i], frame.noisy.get(c).values[i], 1e-6);
+}
+
+TEST(FlatGate, BehindADenoiserItMovesComponentsLikeTheirSum) {
+  NoisyFlat frame = makeNoisyFlat(24, 20, 1, 0.02f);
+  for (const char* c : kRgbNames)
+    for (const auto& [light, part] : {std::pair("diffuse.", 0.75f), std::pair("specular.", 0.25f)})
+      for (Image* image : {&frame.noisy, &frame.truth}) {
+        const Buffer<float> whole = image->get(c).values.copy();
+        Buffer<float>& values = image->add(std::string(light) + c).values;
+        for (size_t i = 0; i < values.size(); ++i) values[i] = part * whole[i];
+      }
+  const Denoiser bare = [&](const Image&, const Progress&) { return damaged(frame, 0.3f); };
+  const Image result = withGate(bare)(frame.noisy, {}),
+              expected = gated(frame.noisy, noiseOf(frame.noisy), bare({}, {}));
+  const Image before = damaged(frame, 0.3f);
+  double moved = 0;
+  for (const char* c : kRgbNames)
+    for (size_t i = 0; i < 480; ++i) {
+      const float whole = result.get(c).values[i];
+      EXPECT_EQ(whole, expected.get(c).values[i]);
+      EXPECT_NEAR(result.get(std::string("diffuse.") + c).values[i], 0.75f * whole, 1e-5);
+      EXPECT_NEAR(result.get(std::string("specular.") + c).values[i], 0.25f * whole, 1e-5);
+      moved += double(std::abs(whole - before.get(c).values[i])) / 1440;
+    }
+  EXPECT_GT(moved, 0.05);
+}
+
+TEST(FlatGate, BehindADenoiserItLeavesFramesThatSayNothingOfTheirNoise) {
+  NoisyFlat frame = makeNoisyFlat(8, 6, 1, 0.02f);
+  std::erase_if(frame.noisy.planes, [](const Plane& plane) { return plane.name.size() > 1; });
+  ASSERT_FALSE(tellsNoise(frame.noisy));
+  const Denoiser bare = [&](const Image&, const Progress&) { return damaged(frame, 0.3f); };
+  const Image result = withGate(bare)(frame.noisy, {}), expected = bare({}, {});
+  for (const char* c : kRgbNames)
+    for (size_t i = 0; i < 48; ++i) EXPECT_EQ(result.get(c).values[i], expected.get(c).values[i]);
 }
 
 TEST(FlatGate, ScalesWithTheLight) {
