@@ -112,7 +112,7 @@ BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan,
   if (!plan.params.gate) return base;
   base.denoise = flat::withGate(std::move(base.denoise));
   base.settings += " gated";
-  base.readsStatistics = true;
+  base.gated = true;
   return base;
 }
 

@@ -43,7 +43,8 @@ struct BaseDenoiser {
   flat::Denoiser denoise;
   std::string settings;          // all that decides its result, as text to be hashed
   BytesOf bytes = {};            // none: counted with the image
-  bool readsStatistics = false;  // variances, half buffers and counts
+  bool readsStatistics = false;  // all variances, half buffers and counts
+  bool gated = false;            // it reads those that our own filter does
   std::function<void(std::map<std::string, uint64_t>&)> addCounts = {};  // of what it did since it was asked last
 };
 

@@ -59,11 +59,11 @@ void wantInputs(const deep::DenoisePlan& plan, Statistics statistics, FrameSourc
   });
 }
 
-// Another base may take all statistics, or none but what tells errors.
+// Another base may take all statistics, or none but what tells errors and what the gate goes by.
 Statistics statisticsOf(const SequencePlan& plan) {
   if (!plan.base) return Statistics::OfOwnFilter;
   if (plan.base->readsStatistics) return Statistics::All;
-  return plan.errors ? Statistics::OfOwnFilter : Statistics::None;
+  return plan.errors || plan.base->gated ? Statistics::OfOwnFilter : Statistics::None;
 }
 
 SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, const deep::DenoiseParams& params,
