@@ -167,6 +167,26 @@ class Variations(unittest.TestCase):
                 found = np.sort(np.linalg.norm(inputs[6:9], axis=0).ravel())
                 np.testing.assert_allclose(found, lengths, rtol=1e-5)
 
+    def test_a_pattern_leaves_the_noise_in_proportion(self):
+        stack, _ = planes.measure(noisy_channels())
+        targets = {name: 2 * stack[planes.WHERE[name]] for name in planes.LIGHTS}
+        where = planes.WHERE
+        albedos = set()
+        for seed in range(20):
+            changed, after = augment.patterned(np.random.default_rng(seed), stack, targets)
+            pattern = changed[where["rgb"]][0] / stack[where["rgb"]][0]
+            self.assertGreater(pattern.std(), 0.1)
+            self.assertTrue(0.5 < pattern.mean() < 2)
+            for light in planes.LIGHTS:
+                np.testing.assert_allclose(after[light], 2 * changed[where[light]], rtol=1e-5)
+                for layer in ("noise", "root", "halves"):
+                    layer = where[f"{light}.{layer}"]
+                    np.testing.assert_allclose(changed[layer], stack[layer] * pattern, rtol=1e-4, atol=1e-7)
+            for layer in ("alpha", "depth", "normal.noise"):
+                np.testing.assert_array_equal(changed[where[layer]], stack[where[layer]])
+            albedos.add(bool((changed[where["albedo"]] != stack[where["albedo"]]).any()))
+        self.assertEqual(albedos, {False, True})
+
     def test_loss(self):
         a, b = torch.full((1, 3, 4, 4), 0.5), torch.full((1, 3, 4, 4), 0.3)
         self.assertAlmostEqual(float(loss.smape(a, b)), 0.2 / 0.81, places=6)
