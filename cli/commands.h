@@ -11,6 +11,7 @@ void addConvert(CLI::App& app);
 void addCluster(CLI::App& app);
 void addDenoise(CLI::App& app);
 void addModels(CLI::App& app);
+void addTrain(CLI::App& app);
 void addProgressive(CLI::App& app);
 void addCompare(CLI::App& app);
 void addPng(CLI::App& app);

@@ -18,8 +18,8 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "fathom " FATHOM_VERSION);
   app.require_subcommand(1);
   using namespace fathom::cli;
-  for (auto add : {addInfo, addConvert, addCluster, addDenoise, addModels, addProgressive, addCompare, addPng, addComp,
-                   addOperations})
+  for (auto add : {addInfo, addConvert, addCluster, addDenoise, addModels, addTrain, addProgressive, addCompare, addPng,
+                   addComp, addOperations})
     add(app);
   try {
     app.parse(argc, argv);
