@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <cstring>
@@ -12,8 +13,6 @@
 
 #include "cli/commands.h"
 #include "flat/error.h"
-
-extern char** environ;
 
 namespace fathom::cli {
 
