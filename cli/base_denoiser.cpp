@@ -30,9 +30,10 @@ BaseDenoiser oidnBase(const BaseOptions& options, deep::Quality quality, size_t 
 }
 
 Model modelOf(const BaseOptions& options, deep::Quality quality) {
-  if (!options.model.empty()) return loadModel(options.model);
+  const nn::Precision precision = quality == deep::Quality::Fast ? nn::Precision::automatic : nn::Precision::float32;
+  if (!options.model.empty()) return loadModel(options.model, precision);
   const std::string name = defaultModel(quality == deep::Quality::Best);
-  return loadModel(name.empty() ? "small" : name);
+  return loadModel(name.empty() ? "small" : name, precision);
 }
 
 BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_t scratch) {

@@ -66,11 +66,11 @@ std::vector<std::string> findModels() {
   return result;
 }
 
-Model loadModel(const std::string& model) {
+Model loadModel(const std::string& model, nn::Precision precision) {
   Model result;
   result.path = pathOf(model);
   const nn::WeightFile file = nn::readWeights(result.path);
-  result.net = std::make_shared<nn::CompositionalNet>(file);
+  result.net = std::make_shared<nn::CompositionalNet>(file, precision);
   for (const auto& [name, tensor] : file.tensors) result.parameters += tensor.values.size();
   result.name = textOf(file, "name");
   result.steps = textOf(file, "steps");

@@ -25,7 +25,7 @@ struct Model {
 };
 
 // `model`: a name that findModels finds (small, base), or a file. Throws Error where it cannot be had.
-Model loadModel(const std::string& model);
+Model loadModel(const std::string& model, nn::Precision precision = nn::Precision::float32);
 
 // The model that is meant where none is named: base for `best`, else small; where that is not installed, the other. Empty
 // where neither is.
