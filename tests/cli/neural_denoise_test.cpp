@@ -25,7 +25,6 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
-using testing::Not;
 
 class NeuralDenoise : public testing::Test {
  protected:

@@ -14,7 +14,6 @@
 namespace fathom::flat {
 namespace {
 
-using reference::boxMean;
 using reference::makeNoisyFlat;
 using reference::NoisyFlat;
 

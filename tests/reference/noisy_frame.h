@@ -1,6 +1,8 @@
 // A small noisy deep frame with everything that the channel convention knows, for tests.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <random>
 #include <string>
@@ -48,19 +50,20 @@ inline deep::DeepImage makeNoisyFrame(int width, int height, unsigned seed) {
     const auto albedo = [&](const Bin& b) { return b.front ? 0.8f - 0.1f * float(c) : 0.4f + 0.1f * float(c); };
     for (const std::string layer : {"diffuse", "specular"}) {
       for (const std::string half : {"half0.", "half1."})
-        fill(half + layer + "." + end, [&](const Bin& b) {
+        fill(fmt::format("{}{}.{}", half, layer, end), [&](const Bin& b) {
           const float light = layer == "diffuse" ? albedo(b) : 0.2f;
           return alpha(b) * light * (1.0f + 0.01f * float(b.y) + noise(random) / std::sqrt(float(b.samples)));
         });
-      const auto a = std::as_const(image).get("half0." + layer + "." + end);
-      const auto b = std::as_const(image).get("half1." + layer + "." + end);
+      const auto a = std::as_const(image).get(fmt::format("half0.{}.{}", layer, end));
+      const auto b = std::as_const(image).get(fmt::format("half1.{}.{}", layer, end));
       std::vector<float> mean(a.size());
       for (size_t i = 0; i < mean.size(); ++i) mean[i] = (a[i] + b[i]) / 2;
-      std::copy(mean.begin(), mean.end(), image.add(layer + "." + end, deep::PixelType::Float).values.begin());
+      std::copy(mean.begin(), mean.end(),
+                image.add(fmt::format("{}.{}", layer, end), deep::PixelType::Float).values.begin());
     }
     for (const std::string prefix : {"", "half0.", "half1."}) {
-      const auto d = std::as_const(image).get(prefix + "diffuse." + end),
-                 s = std::as_const(image).get(prefix + "specular." + end);
+      const auto d = std::as_const(image).get(fmt::format("{}diffuse.{}", prefix, end)),
+                 s = std::as_const(image).get(fmt::format("{}specular.{}", prefix, end));
       std::vector<float> sum(d.size());
       for (size_t i = 0; i < sum.size(); ++i) sum[i] = d[i] + s[i];
       std::copy(sum.begin(), sum.end(), image.add(prefix + end, deep::PixelType::Float).values.begin());
