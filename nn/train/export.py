@@ -19,7 +19,7 @@ from weights import load_model, save_model
 
 LICENCE = "Apache-2.0"
 LIMITS = (
-    "Trained on path-traced frames of interiors, objects and hair, of 4 to 128 samples per pixel; frames of another kind, or"
+    "Trained on path-traced frames of interiors, objects and hair, of 2 to 128 samples per pixel; frames of another kind, or"
     " far noisier, are outside of what it has seen. It looks at one frame at a time."
 )
 
@@ -42,7 +42,7 @@ def card(name, model, saved, rows, words, limits):
         f"Weights of the compositional denoiser (`nn/train/model.py`), width {model.width},"
         f" {sum(x.numel() for x in model.parameters())} parameters. Licence: {LICENCE}, as Fathom's.",
         "",
-        f"- Trained in {saved['step']} steps ({saved['hours']:.1f} hours on {saved['threads']} processor cores), batches of"
+        f"- Trained in {saved['step']} steps ({saved['hours']:.1f} hours on {saved['threads']} processor core(s)), batches of"
         f" {saved['batch']}, {saved['batch'] // 2} and {saved['batch'] // 4} crops of {saved['crop']}x{saved['crop']}"
         " pixels for K = 1, 2 and 4; the weights are the running average.",
         f"- Data: {words or 'renders with references'}: {len(saved['frames'])} noisy frames of"

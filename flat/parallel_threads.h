@@ -1,4 +1,0 @@
-// See base/parallel_threads.h.
-#pragma once
-
-#include "base/parallel_threads.h"  // IWYU pragma: export
