@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
+#include "base/error.h"
 #include "deep/io.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/error.h"
 #include "cli/memory_limit.h"
 #include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
-#include "flat/error.h"
 #include "flat/gate.h"
 #include "flat/neural.h"
 #include "flat/oidn.h"

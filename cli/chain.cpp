@@ -6,7 +6,7 @@
 #include <iterator>
 #include <optional>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/error.h"
 #include "cli/chain_sink.h"
 #include "cli/chain_stage.h"
 #include "cli/stopwatch.h"
-#include "flat/error.h"
 #include "flat/parallel_in_order.h"
 
 namespace fathom::cli {

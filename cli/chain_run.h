@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "cli/chain.h"
-#include "flat/progress.h"
 
 namespace fathom::cli {
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "cli/chain_run.h"
 #include "cli/chain_source.h"
 #include "deep/channels.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "flat/tonemap.h"
 

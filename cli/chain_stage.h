@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "cli/chain.h"
 #include "cli/chain_source.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -8,9 +8,9 @@
 #include <sstream>
 #include <string_view>
 
+#include "base/error.h"
 #include "cli/channel_presets.h"
 #include "deep/volume.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -5,12 +5,12 @@
 #include <cstdio>
 #include <optional>
 
+#include "base/error.h"
 #include "cli/bands.h"
 #include "cli/commands.h"
 #include "deep/channels.h"
 #include "deep/cluster.h"
 #include "deep/ppu_scale.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

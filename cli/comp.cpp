@@ -11,6 +11,7 @@
 #include <set>
 #include <thread>
 
+#include "base/error.h"
 #include "cli/chain_run.h"
 #include "cli/commands.h"
 #include "cli/content_hash.h"
@@ -19,7 +20,6 @@
 #include "cli/operation_words.h"
 #include "cli/peak_memory.h"
 #include "cli/progress_display.h"
-#include "flat/error.h"
 #include "flat/output_file.h"
 
 namespace fathom::cli {

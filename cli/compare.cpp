@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "base/error.h"
 #include "cli/commands.h"
 #include "cli/compare_report.h"
 #include "cli/load_image.h"
@@ -12,7 +13,6 @@
 #include "deep/compare.h"
 #include "deep/flatten.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "flat/heatmap.h"
 #include "flat/io.h"
 #include "flat/metrics.h"

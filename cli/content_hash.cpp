@@ -6,7 +6,7 @@
 #include <fstream>
 #include <vector>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 

@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <map>
 
+#include "base/error.h"
 #include "cli/bands.h"
 #include "cli/commands.h"
 #include "deep/io.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

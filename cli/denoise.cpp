@@ -7,13 +7,13 @@
 #include <cmath>
 #include <thread>
 
+#include "base/error.h"
 #include "cli/commands.h"
 #include "cli/denoise_job.h"
 #include "cli/denoise_stats.h"
 #include "cli/interrupt.h"
 #include "cli/progress_display.h"
 #include "cli/sequence.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "base/error.h"
 #include "cli/memory_limit.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "flat/sure.h"
 
 namespace fathom::cli {

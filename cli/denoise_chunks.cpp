@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <new>
 
+#include "base/error.h"
 #include "cli/content_hash.h"
 #include "cli/stopwatch.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

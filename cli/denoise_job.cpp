@@ -9,13 +9,13 @@
 #include <cstring>
 #include <filesystem>
 
+#include "base/error.h"
 #include "cli/calibration.h"
 #include "cli/denoise_budget.h"
 #include "cli/memory_limit.h"
 #include "cli/method_choice.h"
 #include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "cli/base_denoiser.h"
 #include "cli/denoise_sequence.h"
 #include "cli/load_image.h"
 #include "cli/sequence.h"
-#include "flat/progress.h"
 
 namespace fathom::cli {
 

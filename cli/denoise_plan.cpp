@@ -6,6 +6,7 @@
 #include <cmath>
 #include <exception>
 
+#include "base/error.h"
 #include "cli/memory_limit.h"
 #include "cli/stopwatch.h"
 #include "deep/alpha.h"
@@ -14,7 +15,6 @@
 #include "deep/error_estimate.h"
 #include "deep/flat_nl_means.h"
 #include "deep/noise_response.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -8,11 +8,11 @@
 #include <optional>
 #include <set>
 
+#include "base/error.h"
+#include "base/progress.h"
 #include "cli/denoise_chunks.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
-#include "flat/error.h"
-#include "flat/progress.h"
 
 namespace fathom::cli {
 

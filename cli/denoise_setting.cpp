@@ -4,9 +4,9 @@
 
 #include <filesystem>
 
+#include "base/error.h"
 #include "cli/frame_sink.h"
 #include "deep/io.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

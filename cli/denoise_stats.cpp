@@ -4,8 +4,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "cli/peak_memory.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

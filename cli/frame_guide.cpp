@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "cli/memory_limit.h"
 #include "cli/method_choice.h"
 #include "deep/flat_nl_means.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "flat/noise.h"
 #include "flat/oidn.h"

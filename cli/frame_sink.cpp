@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/one_bin.h"
-#include "flat/error.h"
 #include "flat/io.h"
 
 namespace fathom::cli {

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "deep/assemble.h"
 #include "deep/channels.h"
 #include "deep/cluster.h"
 #include "deep/one_bin.h"
 #include "deep/ppu_scale.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "flat/io.h"
 
 namespace fathom::cli {

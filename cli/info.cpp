@@ -8,13 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/error.h"
 #include "cli/bands.h"
 #include "cli/commands.h"
 #include "cli/statistics_report.h"
 #include "deep/denoise.h"
 #include "deep/io.h"
 #include "deep/statistics.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

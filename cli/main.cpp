@@ -5,9 +5,9 @@
 #include <exception>
 #include <new>
 
+#include "base/error.h"
+#include "base/progress.h"
 #include "cli/commands.h"
-#include "flat/error.h"
-#include "flat/progress.h"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <set>
 
+#include "base/error.h"
 #include "cli/content_hash.h"
-#include "flat/error.h"
 #include "nn/weights.h"
 
 namespace fathom::cli {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "cli/commands.h"
 #include "cli/model_files.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 

@@ -6,7 +6,7 @@
 #include <cctype>
 #include <utility>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 

@@ -6,13 +6,13 @@
 #include <memory>
 #include <utility>
 
+#include "base/error.h"
 #include "cli/operation.h"
 #include "cli/sample_report.h"
 #include "cli/statistics_report.h"
 #include "deep/ops/ids.h"
 #include "deep/ops/points.h"
 #include "deep/ops/stats.h"
-#include "flat/error.h"
 #include "flat/output_file.h"
 
 namespace fathom::cli {

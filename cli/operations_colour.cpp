@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 
+#include "base/error.h"
 #include "cli/operation.h"
 #include "cli/row_counts.h"
 #include "deep/ops/compress.h"
@@ -12,7 +13,6 @@
 #include "deep/ops/grade.h"
 #include "deep/ops/named_channels.h"
 #include "deep/ops/recolour.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

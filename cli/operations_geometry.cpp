@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/error.h"
 #include "cli/operation.h"
 #include "deep/ops/insert.h"
 #include "deep/ops/limit.h"
@@ -13,7 +14,6 @@
 #include "deep/ops/resize.h"
 #include "deep/ops/shuffle.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <memory>
 
+#include "base/error.h"
 #include "cli/operation.h"
 #include "cli/row_counts.h"
 #include "deep/channels.h"
@@ -13,7 +14,6 @@
 #include "deep/ops/crop.h"
 #include "deep/ops/merge.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

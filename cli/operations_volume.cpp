@@ -1,4 +1,5 @@
 // Operations on what stands in front of what, and on volumes: holdout, clip by a map, keymix, plus, deepen, fog.
+#include "base/error.h"
 #include "cli/operation.h"
 #include "deep/clip.h"
 #include "deep/ops/deepen.h"
@@ -6,7 +7,6 @@
 #include "deep/ops/holdout.h"
 #include "deep/ops/keymix.h"
 #include "deep/ops/plus.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

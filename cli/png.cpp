@@ -5,11 +5,11 @@
 #include <limits>
 #include <memory>
 
+#include "base/error.h"
 #include "cli/commands.h"
 #include "cli/load_image.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "flat/label.h"
 #include "flat/tonemap.h"

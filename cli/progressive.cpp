@@ -6,13 +6,13 @@
 #include <optional>
 #include <thread>
 
+#include "base/error.h"
 #include "cli/channel_map.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/progress_display.h"
 #include "cli/progressive_job.h"
 #include "cli/progressive_report.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

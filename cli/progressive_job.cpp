@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "base/error.h"
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
 #include "cli/frame_source.h"
@@ -17,7 +18,6 @@
 #include "deep/flat_nl_means.h"
 #include "deep/noise_response.h"
 #include "deep/one_bin.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "flat/progressive.h"
 

@@ -6,8 +6,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/ops/sample.h"
-#include "flat/error.h"
 
 namespace fathom::cli {
 

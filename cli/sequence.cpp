@@ -10,7 +10,7 @@
 #include <optional>
 #include <string_view>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 

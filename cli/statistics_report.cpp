@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 

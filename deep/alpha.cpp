@@ -3,8 +3,8 @@
 // does not.
 #include "deep/alpha.h"
 
+#include "base/parallel.h"
 #include "deep/volume.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

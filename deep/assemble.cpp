@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "base/parallel.h"
 #include "deep/alpha.h"
 #include "deep/bin_layout.h"
 #include "deep/channels.h"
 #include "deep/volume.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -7,10 +7,10 @@
 #include <span>
 #include <string>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/alpha.h"
 #include "deep/denoise_data.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 namespace fathom::deep {
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
+#include "base/parallel.h"
 #include "deep/denoise_data.h"
 #include "flat/neighbourhood.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

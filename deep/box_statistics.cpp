@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "deep/row_weights.h"
 #include "deep/sample_depths.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -4,8 +4,8 @@
 #include <atomic>
 #include <vector>
 
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

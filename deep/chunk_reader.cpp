@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

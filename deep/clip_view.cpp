@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/pixel_view.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

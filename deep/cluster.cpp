@@ -7,10 +7,10 @@
 #include <cmath>
 #include <tuple>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/cluster_plan.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

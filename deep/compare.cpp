@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/alpha.h"
 #include "deep/sample_depths.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
+#include "base/parallel.h"
 #include "deep/bin_neighbours.h"
 #include "deep/still.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

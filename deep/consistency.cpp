@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "flat/finite.h"
 #include "flat/mix.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "deep/image.h"
-#include "flat/progress.h"
 
 namespace fathom::flat {
 struct NoiseResponse;

@@ -6,9 +6,9 @@
 #include <array>
 #include <vector>
 
+#include "base/buffer.h"
 #include "deep/denoise.h"
 #include "deep/joint_filter.h"
-#include "flat/buffer.h"
 #include "flat/finite.h"
 
 namespace fathom::deep {

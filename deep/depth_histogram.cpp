@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parallel.h"
+#include "base/progress.h"
 #include "deep/row_weights.h"
 #include "deep/sample_depths.h"
-#include "flat/parallel.h"
-#include "flat/progress.h"
 
 namespace fathom::deep {
 

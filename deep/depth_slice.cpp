@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/pixel_pieces.h"
 #include "deep/sample_depths.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

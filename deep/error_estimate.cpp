@@ -6,12 +6,12 @@
 #include <string>
 #include <utility>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/alpha.h"
 #include "deep/flat_noisy.h"
-#include "flat/error.h"
 #include "flat/error_map.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 #include "flat/perturb.h"
 
 namespace fathom::deep {

@@ -14,7 +14,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

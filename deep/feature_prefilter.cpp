@@ -1,7 +1,7 @@
 #include "deep/feature_prefilter.h"
 
+#include "base/parallel.h"
 #include "deep/guide.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <string>
 
+#include "base/parallel.h"
 #include "deep/alpha.h"
 #include "deep/denoise_data.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

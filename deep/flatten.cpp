@@ -6,11 +6,11 @@
 #include <array>
 #include <string>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/flat_attributes.h"
 #include "deep/row_weights.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

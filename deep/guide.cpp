@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/parallel.h"
 #include "deep/still.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

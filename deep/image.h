@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
+#include "base/buffer.h"
 #include "deep/attributes.h"
 #include "flat/box.h"
-#include "flat/buffer.h"
 #include "flat/exr_types.h"
 
 namespace fathom::deep {

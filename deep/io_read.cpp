@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/chunk_reader.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

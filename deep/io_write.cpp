@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "base/error.h"
 #include "deep/chunk_grid.h"
 #include "deep/exr_output.h"
-#include "flat/error.h"
 #include "flat/exr_codec.h"
 #include "flat/parallel_in_order.h"
 

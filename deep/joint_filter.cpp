@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deep/joint_filter.cpp"

@@ -18,8 +18,8 @@
 #include <span>
 #include <vector>
 
+#include "base/buffer.h"
 #include "flat/box.h"
-#include "flat/buffer.h"
 #include "flat/padded.h"
 
 namespace fathom::deep {

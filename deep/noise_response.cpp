@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 namespace fathom::deep {
 

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <string>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 namespace fathom::deep {
 

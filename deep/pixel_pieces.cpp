@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

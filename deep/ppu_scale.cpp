@@ -7,8 +7,8 @@
 #include <cmath>
 #include <optional>
 
+#include "base/error.h"
 #include "deep/camera_matrix.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

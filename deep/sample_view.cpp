@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "base/parallel.h"
 #include "deep/sample_depths.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -4,9 +4,9 @@
 #include <bit>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "deep/still.h"
 #include "flat/bilateral.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

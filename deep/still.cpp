@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 namespace fathom::deep {
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <atomic>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/sample_depths.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

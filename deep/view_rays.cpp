@@ -3,9 +3,9 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/camera_matrix.h"
 #include "deep/ppu_scale.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

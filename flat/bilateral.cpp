@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "flat/bilateral.cpp"

@@ -3,8 +3,8 @@
 
 #include <functional>
 
+#include "base/progress.h"
 #include "flat/image.h"
-#include "flat/progress.h"
 
 namespace fathom::flat {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "base/parallel.h"
 #include "flat/bilateral.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::flat {
 

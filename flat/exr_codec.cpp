@@ -7,7 +7,7 @@
 #include <bit>
 #include <cstring>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom {
 

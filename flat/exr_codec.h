@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "flat/buffer.h"
+#include "base/buffer.h"
 #include "flat/exr_types.h"
 
 struct libdeflate_compressor;

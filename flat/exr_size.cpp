@@ -13,7 +13,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::flat {
 

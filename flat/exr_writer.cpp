@@ -8,8 +8,8 @@
 #include <set>
 #include <vector>
 
+#include "base/error.h"
 #include "flat/attribute_text.h"
-#include "flat/error.h"
 #include "flat/exr_attributes.h"
 #include "flat/exr_bytes.h"
 #include "flat/exr_codec.h"

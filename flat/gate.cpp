@@ -2,10 +2,10 @@
 
 #include <array>
 
+#include "base/parallel.h"
 #include "flat/finite.h"
 #include "flat/gate_kernel.h"
 #include "flat/neighbourhood.h"
-#include "flat/parallel.h"
 
 namespace fathom::flat {
 

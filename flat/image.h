@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/buffer.h"
 #include "flat/box.h"
-#include "flat/buffer.h"
 
 namespace fathom::flat {
 

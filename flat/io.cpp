@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "flat/exr_size.h"
 #include "flat/exr_writer.h"
 #include "flat/oiio/module.h"

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "flat/error.h"
+#include "base/error.h"
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 #include "flat/ssim.h"
 #include "flat/tonemap.h"
 

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/parallel.h"
 #include "flat/finite.h"
 #include "flat/neural_planes.h"
 #include "flat/noise.h"
-#include "flat/parallel.h"
 #include "nn/tiles.h"
 
 namespace fathom::flat {

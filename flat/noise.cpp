@@ -5,9 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "flat/error.h"
+#include "base/error.h"
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::flat {
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "flat/error.h"
+#include "base/error.h"
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::flat {
 

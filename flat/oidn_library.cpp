@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::flat {
 

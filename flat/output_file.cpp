@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "flat/buffer.h"
+#include "base/buffer.h"
 
 namespace fathom::flat {
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 #ifndef __SANITIZE_THREAD__
 #include <tbb/parallel_pipeline.h>
@@ -26,7 +26,7 @@ void parallelPipeline(size_t begin, size_t end, size_t most, const Fetch& fetch,
   using Fetched = decltype(fetch(begin));
   using Made = decltype(make(begin, std::declval<Fetched>()));
 #ifdef __SANITIZE_THREAD__
-  // See flat/parallel.h.
+  // See base/parallel.h.
   for (size_t first = begin; first < end; first += most) {
     std::vector<std::optional<Fetched>> fetched(std::min(most, end - first));
     std::vector<std::optional<Made>> made(fetched.size());

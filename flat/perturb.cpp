@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::flat {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::flat {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 namespace fathom::flat {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "flat/error.h"
+#include "base/error.h"
+#include "base/parallel.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 #include "flat/perturb.h"
 
 namespace fathom::flat {

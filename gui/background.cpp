@@ -5,7 +5,7 @@
 #include <new>
 #include <utility>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::gui {
 

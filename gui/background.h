@@ -8,7 +8,7 @@
 #include <mutex>
 #include <stop_token>
 
-#include "flat/progress.h"
+#include "base/progress.h"
 #include "gui/worker.h"
 
 namespace fathom::gui {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/sample_view.h"
-#include "flat/error.h"
 
 namespace fathom::gui {
 

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "flat/colour_scale.h"
-#include "flat/error.h"
 #include "flat/finite.h"
 #include "flat/metrics.h"
-#include "flat/parallel.h"
 
 namespace fathom::gui {
 

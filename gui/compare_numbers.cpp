@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "base/error.h"
 #include "deep/clip_view.h"
 #include "deep/compare.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 
 namespace fathom::gui {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "flat/metrics.h"
-#include "flat/progress.h"
 #include "gui/picture.h"
 
 namespace fathom::gui {

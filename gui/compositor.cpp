@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "flat/parallel.h"
+#include "base/parallel.h"
 
 namespace fathom::gui {
 

@@ -9,8 +9,8 @@
 #include <optional>
 #include <sstream>
 
+#include "base/error.h"
 #include "flat/curve_table.h"
-#include "flat/error.h"
 
 namespace ocio = OCIO_NAMESPACE;
 

@@ -3,11 +3,11 @@
 #include <QFileInfo>
 #include <QSaveFile>
 
+#include "base/error.h"
 #include "cli/denoise_job.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 
 namespace fathom::gui {

@@ -5,7 +5,7 @@
 #include <unordered_set>
 #include <utility>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::gui {
 

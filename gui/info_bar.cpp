@@ -2,7 +2,7 @@
 
 #include <QPainter>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "gui/pixel_samples.h"
 #include "gui/seen.h"
 

@@ -8,7 +8,7 @@
 #include <functional>
 #include <stop_token>
 
-#include "flat/progress.h"
+#include "base/progress.h"
 #include "gui/background.h"
 #include "gui/worker.h"
 

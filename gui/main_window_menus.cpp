@@ -4,7 +4,7 @@
 #include <QMenuBar>
 #include <array>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "gui/canvas.h"
 #include "gui/compositor.h"
 #include "gui/depth_panel.h"

@@ -6,10 +6,10 @@
 #include <map>
 #include <span>
 
+#include "base/parallel.h"
 #include "cli/chain_source.h"
 #include "deep/channels.h"
 #include "flat/finite.h"
-#include "flat/parallel.h"
 
 namespace fathom::gui {
 

@@ -6,9 +6,9 @@
 #include <variant>
 #include <vector>
 
+#include "base/progress.h"
 #include "deep/image.h"
 #include "flat/image.h"
-#include "flat/progress.h"
 
 namespace fathom::gui {
 

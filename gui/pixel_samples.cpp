@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/ops/sample.h"
-#include "flat/error.h"
 #include "flat/tonemap.h"
 
 namespace fathom::gui {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "base/error.h"
 #include "deep/ops/insert.h"
 #include "deep/statistics.h"
-#include "flat/error.h"
 
 namespace fathom::gui {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "cli/sample_report.h"
-#include "flat/error.h"
 
 namespace fathom::gui {
 

@@ -8,7 +8,7 @@
 #include <QMenu>
 #include <algorithm>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::gui {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <span>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/ops/insert.h"
 #include "deep/sample_view.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::gui {
 

@@ -6,8 +6,8 @@
 #include <memory>
 #include <vector>
 
+#include "base/progress.h"
 #include "deep/clip_view.h"
-#include "flat/progress.h"
 #include "gui/overlay.h"
 #include "gui/picture.h"
 

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/channels.h"
 #include "deep/ops/pixel_curve.h"
 #include "deep/ops/sample_plan.h"
 #include "deep/pixel_pieces.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

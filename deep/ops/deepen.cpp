@@ -4,13 +4,13 @@
 #include <cmath>
 #include <vector>
 
+#include "base/error.h"
 #include "deep/channels.h"
 #include "deep/flat_attributes.h"
 #include "deep/one_bin.h"
 #include "deep/ops/sample_plan.h"
 #include "deep/tidy.h"
 #include "deep/volume.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

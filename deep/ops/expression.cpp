@@ -5,12 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/ops/formula.h"
 #include "deep/ops/named_channels.h"
 #include "deep/volume.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

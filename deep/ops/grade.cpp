@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/ops/named_channels.h"
 #include "deep/volume.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -9,12 +9,12 @@
 #include <optional>
 #include <vector>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/ops/sample_plan.h"
 #include "deep/pixel_pieces.h"
 #include "deep/sample_depths.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

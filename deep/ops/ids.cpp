@@ -6,12 +6,12 @@
 #include <bit>
 #include <vector>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/flat_attributes.h"
 #include "deep/row_weights.h"
 #include "flat/attribute_text.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

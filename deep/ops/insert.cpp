@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/channels.h"
 #include "deep/ops/merge.h"
 #include "deep/pick.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

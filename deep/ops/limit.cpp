@@ -8,11 +8,11 @@
 #include <limits>
 #include <tuple>
 
+#include "base/error.h"
 #include "deep/channels.h"
 #include "deep/ops/sample_plan.h"
 #include "deep/pixel_pieces.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

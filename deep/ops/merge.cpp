@@ -5,11 +5,11 @@
 #include <set>
 #include <tuple>
 
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/progress.h"
 #include "deep/channels.h"
 #include "deep/sample_depths.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
-#include "flat/progress.h"
 
 namespace fathom::deep {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

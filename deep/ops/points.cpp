@@ -7,11 +7,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/ppu_scale.h"
 #include "deep/view_rays.h"
 #include "deep/volume.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 #include "flat/tonemap.h"
 
 namespace fathom::deep {

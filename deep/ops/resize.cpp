@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::deep {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/channels.h"
 #include "deep/pixel_pieces.h"
 #include "deep/sample_depths.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 

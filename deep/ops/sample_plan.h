@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "base/parallel.h"
 #include "deep/image.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

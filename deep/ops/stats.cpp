@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/pixel_pieces.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

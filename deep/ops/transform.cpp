@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "deep/channels.h"
-#include "flat/error.h"
-#include "flat/parallel.h"
 
 namespace fathom::deep {
 

@@ -8,8 +8,8 @@
 #include <memory>
 #include <new>
 
+#include "base/error.h"
 #include "flat/attribute_text.h"
-#include "flat/error.h"
 #include "flat/oiio/attributes.h"
 
 namespace fathom::flat {

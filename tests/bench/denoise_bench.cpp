@@ -9,10 +9,10 @@
 #include <thread>
 #include <vector>
 
+#include "base/error.h"
 #include "deep/denoise.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "flat/metrics.h"
 #include "tests/bench/frames.h"

@@ -5,7 +5,7 @@
 #include <hwy/targets.h>
 #include <tbb/global_control.h>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/bench/measure.h"
 #include "tests/reference/filter_frame.h"
 #include "tests/reference/joint_filter.h"

@@ -11,7 +11,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::bench {
 namespace {

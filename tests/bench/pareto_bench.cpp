@@ -12,11 +12,11 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/error.h"
 #include "cli/calibration.h"
 #include "cli/stopwatch.h"
 #include "deep/compare.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/bench/frames.h"
 #include "tests/bench/pareto_frames.h"

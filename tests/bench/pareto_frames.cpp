@@ -7,11 +7,11 @@
 #include <numeric>
 #include <random>
 
+#include "base/error.h"
 #include "deep/cluster.h"
 #include "deep/flat_noisy.h"
 #include "deep/io.h"
 #include "deep/ppu_scale.h"
-#include "flat/error.h"
 #include "flat/io.h"
 
 namespace fathom::bench {

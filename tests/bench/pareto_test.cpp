@@ -2,9 +2,9 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/alpha.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "tests/bench/pareto_frames.h"
 #include "tests/bench/pareto_report.h"
 

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "base/error.h"
 #include "deep/flat_nl_means.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/oidn/installed.h"
 #include "tests/reference/noisy_frame.h"

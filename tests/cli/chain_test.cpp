@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom::cli {

@@ -7,12 +7,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "cli/chain_run.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "deep/ops/merge.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/random_ops.h"
 #include "tests/reference/run_fathom.h"

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <set>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/noisy_frame.h"
 #include "tests/reference/run_fathom.h"

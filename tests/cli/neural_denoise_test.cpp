@@ -7,12 +7,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "cli/base_denoiser.h"
 #include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/compositional.h"
 #include "tests/reference/noisy_flat.h"

@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/random_ops.h"
 #include "tests/reference/run_chain.h"

@@ -2,10 +2,10 @@
 // the function that it stands for.
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "deep/io.h"
 #include "deep/ops/insert.h"
 #include "deep/ops/resize.h"
-#include "flat/error.h"
 #include "tests/reference/random_ops.h"
 #include "tests/reference/run_chain.h"
 

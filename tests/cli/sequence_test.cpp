@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::cli {
 namespace {

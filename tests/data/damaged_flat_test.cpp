@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "flat/io.h"
 
 namespace fathom::flat {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::deep {

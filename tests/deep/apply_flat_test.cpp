@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/one_bin.h"
-#include "flat/error.h"
 #include "tests/reference/noisy_frame.h"
 
 namespace fathom::deep {

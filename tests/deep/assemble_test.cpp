@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "deep/alpha.h"
 #include "deep/one_bin.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 namespace {

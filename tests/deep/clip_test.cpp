@@ -5,9 +5,9 @@
 #include <limits>
 #include <random>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_deep.h"
 

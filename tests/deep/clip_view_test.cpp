@@ -6,10 +6,10 @@
 #include <cstring>
 #include <random>
 
+#include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_deep.h"
 

@@ -10,10 +10,10 @@
 #include <limits>
 #include <random>
 
+#include "base/error.h"
 #include "deep/alpha.h"
 #include "deep/flatten.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/cluster.h"
 #include "tests/reference/deep_samples.h"
 

@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
+#include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::deep {

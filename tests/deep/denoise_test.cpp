@@ -10,7 +10,7 @@
 #include <limits>
 #include <set>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/rendered_frame.h"
 

@@ -7,9 +7,9 @@
 #include <numeric>
 #include <random>
 
+#include "base/error.h"
+#include "base/progress.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
-#include "flat/progress.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::deep {

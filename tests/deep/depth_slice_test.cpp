@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 

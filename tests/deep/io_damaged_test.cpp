@@ -8,9 +8,9 @@
 #include <functional>
 #include <iterator>
 
+#include "base/error.h"
 #include "deep/exr_file.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/temporary_folder.h"
 

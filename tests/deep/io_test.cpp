@@ -21,7 +21,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/openexr_deep.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/temporary_folder.h"

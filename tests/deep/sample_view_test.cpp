@@ -5,9 +5,9 @@
 
 #include <random>
 
+#include "base/error.h"
 #include "deep/alpha.h"
 #include "deep/clip.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::deep {

@@ -9,8 +9,8 @@
 #include <limits>
 #include <random>
 
+#include "base/error.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "tests/reference/tidy.h"
 
 namespace fathom::deep {

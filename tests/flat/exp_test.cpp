@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "flat/buffer.h"
+#include "base/buffer.h"
 #include "tests/reference/simd_targets.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <random>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom {
 namespace {

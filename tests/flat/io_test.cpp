@@ -13,7 +13,7 @@
 #include <fstream>
 #include <limits>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom::flat {

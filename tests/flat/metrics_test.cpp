@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/metrics.h"
 
 namespace fathom::flat {

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/noisy_flat.h"
 
 namespace fathom::flat {

@@ -10,8 +10,8 @@
 #include <fstream>
 #include <limits>
 
+#include "base/error.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "flat/oidn_library.h"
 #include "tests/oidn/installed.h"
 #include "tests/reference/rendered_frame.h"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "flat/error_summary.h"
 #include "tests/reference/noisy_flat.h"
 

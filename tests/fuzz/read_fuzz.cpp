@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "base/error.h"
 #include "deep/io.h"
-#include "flat/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace fathom;

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "flat/colour_scale.h"
-#include "flat/error.h"
 #include "flat/tonemap.h"
 
 namespace fathom::gui {

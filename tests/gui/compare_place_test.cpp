@@ -7,11 +7,11 @@
 #include <QTest>
 #include <QToolButton>
 
+#include "base/error.h"
 #include "deep/compare.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "deep/ops/insert.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "gui/compare_panel.h"
 #include "gui/inspector_panel.h"

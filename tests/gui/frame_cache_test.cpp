@@ -11,7 +11,7 @@
 #include <mutex>
 #include <semaphore>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom::gui {

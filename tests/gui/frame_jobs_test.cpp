@@ -7,11 +7,11 @@
 #include <QTest>
 #include <filesystem>
 
+#include "base/error.h"
 #include "cli/denoise_job.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/rendered_frame.h"

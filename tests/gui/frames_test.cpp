@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "flat/io.h"
 #include "gui/playback_bar.h"
 #include "tests/reference/temporary_folder.h"

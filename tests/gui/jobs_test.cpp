@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "gui/background.h"
 #include "gui/jobs_bar.h"
 #include "gui/worker.h"

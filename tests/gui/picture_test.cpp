@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "flat/error.h"
+#include "base/error.h"
 
 namespace fathom::gui {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::gui {

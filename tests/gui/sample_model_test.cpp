@@ -11,8 +11,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
 #include "deep/ops/sample.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 
 namespace fathom::gui {

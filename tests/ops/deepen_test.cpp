@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "base/error.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 
 namespace fathom::deep {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/radiative.h"
 #include "tests/reference/random_ops.h"

@@ -5,13 +5,13 @@
 
 #include <filesystem>
 
+#include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "deep/ops/crop.h"
 #include "deep/ops/merge.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/radiative.h"
 #include "tests/reference/random_ops.h"

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <map>
 
+#include "base/error.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "flat/io.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"

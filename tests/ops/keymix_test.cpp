@@ -6,10 +6,10 @@
 #include <limits>
 #include <random>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/radiative.h"
 #include "tests/reference/random_ops.h"
 

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <set>
 
+#include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
-#include "flat/error.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "deep/channels.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
-#include "flat/error.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 

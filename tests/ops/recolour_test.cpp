@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 

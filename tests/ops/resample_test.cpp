@@ -8,11 +8,11 @@
 #include <limits>
 #include <set>
 
+#include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
 #include "deep/tidy.h"
-#include "flat/error.h"
 #include "tests/reference/random_ops.h"
 #include "tests/reference/resample.h"
 

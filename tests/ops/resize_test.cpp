@@ -5,10 +5,10 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
 #include "deep/ops/reformat.h"
-#include "flat/error.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {

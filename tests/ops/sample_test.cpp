@@ -6,10 +6,10 @@
 #include <bit>
 #include <cmath>
 
+#include "base/error.h"
 #include "cli/sample_report.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
-#include "flat/error.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 #include "tests/reference/transmittance.h"

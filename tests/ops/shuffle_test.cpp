@@ -6,7 +6,7 @@
 
 #include <cstring>
 
-#include "flat/error.h"
+#include "base/error.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {

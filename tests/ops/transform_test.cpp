@@ -7,13 +7,13 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
+#include "base/progress.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
 #include "deep/ops/insert.h"
 #include "deep/ops/merge.h"
 #include "deep/pick.h"
-#include "flat/error.h"
-#include "flat/progress.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {

@@ -1,4 +1,0 @@
-// See base/buffer.h.
-#pragma once
-
-#include "base/buffer.h"  // IWYU pragma: export

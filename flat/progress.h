@@ -1,4 +1,0 @@
-// See base/progress.h.
-#pragma once
-
-#include "base/progress.h"  // IWYU pragma: export
