@@ -5,7 +5,7 @@
 
 The same command starts a training and goes on with it: OUT/checkpoint.pt has all of its state, so that a training that
 was stopped ends with the bits of one that was not, over the same frames. Frames that appear while it runs are taken in
-at the next validation. OUT/log.csv has a row per validation and frame, and OUT/cache the prepared frames.
+at the next validation. With --start it begins with the weights of a network of the same width or of half of it. OUT/log.csv has a row per validation and frame, and OUT/cache the prepared frames.
 
 Each step draws K from {1, 2, 4}; a batch of K = 1 has twice the crops of K = 2 and four times those of K = 4, so that
 steps cost about the same (supplement, section 2.3).
@@ -27,6 +27,8 @@ from augment import Batches
 from crops import Cache, replace
 from loss import loss, schedule
 from model import COMPONENTS, Compositional, gigaflops_per_megapixel
+from weights import load_model
+from widen import widened
 
 SHARES = {1: 0.3, 2: 0.3, 4: 0.4}  # of the steps
 AVERAGE = 0.999  # of the weights: how much of the average a step keeps
@@ -40,6 +42,7 @@ def options(arguments=None):
     parser.add_argument("--data", nargs="+", type=Path, required=True, help="folders with frames and references")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--width", type=int, default=16)
+    parser.add_argument("--start", type=Path, help="weights or a checkpoint to begin with, of this width or of half of it")
     parser.add_argument("--steps", type=int, default=60000)
     parser.add_argument("--until", type=int, help="step to stop at for now; the rate follows --steps")
     parser.add_argument("--batch", type=int, default=8, help="crops of a step with K = 1, a multiple of 4")
@@ -61,7 +64,7 @@ class Training:
         self.settings = settings
         settings.out.mkdir(parents=True, exist_ok=True)
         torch.manual_seed(settings.seed)
-        self.model = Compositional(settings.width).to(memory_format=torch.channels_last)
+        self.model = self.first_model().to(memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.model)
         self.optimizer = torch.optim.Adam(self.model.parameters(), settings.rate)
         self.step, self.hours, self.losses = 0, 0.0, []
@@ -74,6 +77,17 @@ class Training:
             raise SystemExit("train.py: no frames to train on: " + ", ".join(map(str, settings.data)))
         kept = [pair for pair in frames.find(settings.data) if frames.held_out(pair.scene, settings.share)]
         self.subjects = [evaluate.subject(pair) for pair in kept]
+
+    def first_model(self):
+        settings = self.settings
+        if not settings.start:
+            return Compositional(settings.width)
+        model = load_model(settings.start).train()
+        if 2 * model.width == settings.width:
+            model = widened(model, settings.seed)
+        if model.width != settings.width:
+            raise SystemExit(f"train.py: {settings.start}: expected width {settings.width} or half of it, found {model.width}")
+        return model
 
     @property
     def checkpoint(self):
