@@ -38,7 +38,8 @@ def mean_squares(tensors):
 def loss(result, reference, settling):
     """Of `model.Result`: the error at full size, and what is to be minimised."""
     error = smape(result.colours[0], reference)
-    total = error + SQUARED * relative_square(result.colours[0], reference) + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
+    total = error + SQUARED * relative_square(result.colours[0], reference)
+    total = total + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
     for colour, weight in zip(result.colours[1:], COARSE):
         reference = half_size(reference)
         total = total + weight * smape(colour, reference)

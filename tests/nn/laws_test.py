@@ -23,6 +23,7 @@ import loss
 import planes
 import weights
 from model import COMPONENTS, TAPS, Compositional, Gather, denoised, gigaflops_per_megapixel
+from widen import widened
 
 torch.set_num_threads(1)
 
@@ -74,6 +75,15 @@ class Network(unittest.TestCase):
     def test_sides_of_any_length(self):
         whole = denoised(self.model, self.planes[:, :, :13, :19], self.colour[:, :, :13, :19], 2)
         self.assertEqual(whole.shape, (2, 3, 13, 19))
+
+    def test_a_widened_network_computes_the_same_with_copies_that_differ(self):
+        wide = widened(self.model)
+        self.assertEqual(wide.width, 2 * self.model.width)
+        for k in COMPONENTS:
+            torch.testing.assert_close(wide(self.planes, self.colour, k), self.model(self.planes, self.colour, k))
+        first, second = wide.denoise.merge0.weight[: self.model.width, : 2 * self.model.width].chunk(2, 1)
+        torch.testing.assert_close(first + second, self.model.denoise.merge0.weight[:, : self.model.width])
+        self.assertGreater(float((first - second).abs().max()), 0.01)
 
     def test_work_is_counted_as_in_the_layers(self):
         for width in (16, 32):
