@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "cli/chain_run.h"
+#include "cli/claim.h"
 #include "cli/commands.h"
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
@@ -73,7 +74,7 @@ std::string hashOf(const std::string& text, const std::vector<std::string>& inpu
 
 struct FrameDone {
   int frame = 0;
-  bool kept = false;
+  bool kept = false, elsewhere = false;
   std::string error;
   ChainRunReport report;
 };
@@ -90,16 +91,24 @@ class CompRun {
   std::vector<FrameDone> run() {
     std::vector<FrameDone> done;
     ProgressDisplay display(sequence_.frames.size());
-    for (const int frame : sequence_.frames) {
-      done.push_back(runFrame(frame, display));
-      show(done.back(), display);
+    std::vector<int> frames = sequence_.frames;
+    for (size_t i = 0; i < frames.size(); ++i) {
+      FrameDone frame = runFrame(frames[i], display);
+      // What another process makes is looked at again behind all others.
+      if (frame.elsewhere && i < sequence_.frames.size()) {
+        frames.push_back(frames[i]);
+        continue;
+      }
+      show(frame, display);
+      done.push_back(std::move(frame));
     }
     return done;
   }
 
  private:
   FrameDone runFrame(int frame, ProgressDisplay& display) {
-    FrameDone done{frame, false, {}, {}};
+    FrameDone done;
+    done.frame = frame;
     try {
       ChainRunParams params;
       params.memory = command_.memory;
@@ -107,7 +116,12 @@ class CompRun {
         params.madeBy = hashOf(text_, inputFiles(chain_, frame));
         done.kept = !command_.overwrite && isDone(frame, params.madeBy);
       }
-      if (!done.kept)
+      if (done.kept) {
+        Claim::clear(outputFiles(chain_, frame).front());
+        return done;
+      }
+      const std::shared_ptr<const Claim> claim = claimOf(frame, params.madeBy, done);
+      if (!done.kept && !done.elsewhere)
         done.report = runChain(chain_, frame, params, {[&](double fraction) { display.at(fraction); }, stop_});
     } catch (const Cancelled&) {
       throw;
@@ -117,6 +131,16 @@ class CompRun {
       done.error = e.what();
     }
     return done;
+  }
+
+  // The claim on a frame of a sequence; what another process makes, or has made meanwhile, is noted.
+  std::shared_ptr<const Claim> claimOf(int frame, const std::string& madeBy, FrameDone& done) const {
+    const std::vector<std::string> files = outputFiles(chain_, frame);
+    if (madeBy.empty() || files.empty()) return nullptr;
+    std::shared_ptr<const Claim> claim = Claim::take(files.front());
+    done.elsewhere = !claim;
+    done.kept = claim && !command_.overwrite && isDone(frame, madeBy);
+    return claim;
   }
 
   bool isDone(int frame, const std::string& madeBy) const {
@@ -133,7 +157,11 @@ class CompRun {
     if (!done.error.empty()) return display.tell(fmt::format("fathom: {}{}", name, done.error));
     for (const std::string& note : done.report.notes)
       if (said_.insert(note).second) display.say(name + note);
-    if (several) display.frameDone(fmt::format("{}{}", name, done.kept ? "is there already" : "done"));
+    if (several)
+      display.frameDone(fmt::format("{}{}", name,
+                                    done.kept        ? "is there already"
+                                    : done.elsewhere ? "another process is at it"
+                                                     : "done"));
   }
 
   const CompCommand& command_;
@@ -151,7 +179,7 @@ void writeStatistics(const std::string& path, const std::vector<FrameDone>& done
                          {"seconds", frame.report.seconds},
                          {"counts", frame.report.counts},
                          {"notes", frame.report.notes}};
-    entry["status"] = !frame.error.empty() ? "failed" : frame.kept ? "kept" : "done";
+    entry["status"] = !frame.error.empty() ? "failed" : frame.kept ? "kept" : frame.elsewhere ? "elsewhere" : "done";
     if (!frame.error.empty()) entry["error"] = frame.error;
     json["frames"].push_back(std::move(entry));
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <new>
+#include <numeric>
 
 #include "base/error.h"
 #include "cli/content_hash.h"
@@ -25,25 +26,36 @@ std::string describeError(const DenoiseFrame& frame) {
   }
 }
 
-ChunkReader::ChunkReader(DenoiseJob& job) : job_(job), halo_(deep::denoiseHalo(job.plan.denoise)) {}
+ChunkReader::ChunkReader(DenoiseJob& job)
+    : job_(job), halo_(deep::denoiseHalo(job.plan.denoise)), order_(job.frames.size()) {
+  std::iota(order_.begin(), order_.end(), size_t(0));
+}
 
 std::optional<Chunk> ChunkReader::next() {
   const Stopwatch watch;
-  if (!source_ && frame_ == job_.frames.size()) return {};
   Chunk chunk;
-  chunk.frame = frame_;
   try {
-    if (!source_ && !open()) {
-      chunk.kept = true;
-    } else {
+    Opening opening = Opening::Ready;
+    while (!source_) {
+      if (next_ == order_.size()) return {};
+      chunk.frame = order_[next_];
+      opening = open();
+      if (opening != Opening::Elsewhere || next_ >= job_.frames.size()) break;
+      order_.push_back(order_[next_++]);
+    }
+    chunk.frame = order_[next_];
+    chunk.kept = opening == Opening::Done;
+    chunk.elsewhere = opening == Opening::Elsewhere;
+    if (opening == Opening::Ready) {
       chunk.origin = origin_;
       chunk.guide = guide_;
+      chunk.claim = claim_;
       chunk.band = bands_[band_];
       chunk.image = read(chunk.notes);
       chunk.last = ++band_ == bands_.size();
     }
   } catch (const std::exception&) {
-    chunk.error = describeError(job_.frames[frame_]);
+    chunk.error = describeError(job_.frames[chunk.frame]);
     chunk.last = true;
   }
   if (chunk.last) close();
@@ -51,14 +63,21 @@ std::optional<Chunk> ChunkReader::next() {
   return chunk;
 }
 
-// False where the outputs are there already.
-bool ChunkReader::open() {
-  const DenoiseFrame& frame = job_.frames[frame_];
+ChunkReader::Opening ChunkReader::open() {
+  const DenoiseFrame& frame = job_.frames[order_[next_]];
   ContentHash hash;
   for (const std::string& text : {std::string(FATHOM_VERSION), job_.settings, describePlan(job_.plan)}) hash.add(text);
   for (const std::string& file : frame.inputs.files()) hash.addFile(file);
   const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
-  if (isDone(frame.outputs, madeBy)) return false;
+  if (isDone(frame.outputs, madeBy)) {
+    Claim::clear(frame.outputs.image);
+    return Opening::Done;
+  }
+  if (job_.claims) {
+    claim_ = Claim::take(frame.outputs.image);
+    if (!claim_) return Opening::Elsewhere;
+    if (isDone(frame.outputs, madeBy)) return Opening::Done;
+  }
 
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
   bands_ = planBands(*source_, job_.plan, halo_, job_.memory);
@@ -69,7 +88,7 @@ bool ChunkReader::open() {
   origin_ = std::make_shared<FrameOrigin>(FrameOrigin{frame.inputs.main, source_->deep(), source_->part().number,
                                                       source_->part().dataWindow, source_->flatAttributes(), madeBy,
                                                       job_.plan.record});
-  return true;
+  return Opening::Ready;
 }
 
 bool ChunkReader::isDone(const FrameOutputs& outputs, const std::string& madeBy) const {
@@ -98,8 +117,9 @@ void ChunkReader::close() {
   source_.reset();
   guide_.reset();
   bands_.clear();
+  claim_.reset();
   band_ = 0;
-  ++frame_;
+  ++next_;
 }
 
 Chunk ChunkWriter::write(Chunk chunk) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/claim.h"
 #include "cli/denoise_bands.h"
 #include "cli/denoise_sequence.h"
 
@@ -19,11 +20,13 @@ struct Chunk {
   Band band{0, 0};
   bool last = true;                              // of its frame
   std::shared_ptr<const deep::BaseGuide> guide;  // of the whole frame, where a band needs it
-  deep::DeepImage image;        // the band with the rows around it that decide it; then the band denoised
-  bool kept = false;            // nothing to do: the outputs are there
-  std::string error;            // one line; empty: none
-  double seconds = 0;           // of the stage that it comes from
-  std::set<std::string> notes;  // lines for the user
+  deep::DeepImage image;               // the band with the rows around it that decide it; then the band denoised
+  bool kept = false;                   // nothing to do: the outputs are there
+  bool elsewhere = false;              // nothing to do: another process makes them
+  std::shared_ptr<const Claim> claim;  // on the frame, until it is written
+  std::string error;                   // one line; empty: none
+  double seconds = 0;                  // of the stage that it comes from
+  std::set<std::string> notes;         // lines for the user
 };
 
 // The error that is being handled, in one line that begins with a file of the frame.
@@ -34,18 +37,23 @@ class ChunkReader {
  public:
   explicit ChunkReader(DenoiseJob& job);
 
-  // The next chunk, or nothing after the last one. A frame that cannot be read is one chunk with an error.
+  // The next chunk, or nothing after the last one. A frame that cannot be read is one chunk with an error. Frames that
+  // other processes make are looked at again behind all others.
   std::optional<Chunk> next();
 
  private:
-  bool open();
+  enum class Opening { Ready, Done, Elsewhere };
+
+  Opening open();
   bool isDone(const FrameOutputs& outputs, const std::string& madeBy) const;
   deep::DeepImage read(std::set<std::string>& notes);
   void close();
 
   DenoiseJob& job_;
   const int halo_;
-  size_t frame_ = 0, band_ = 0;
+  std::vector<size_t> order_;  // of the frames
+  size_t next_ = 0, band_ = 0;
+  std::shared_ptr<const Claim> claim_;
   std::optional<FrameSource> source_;
   std::vector<Band> bands_;
   std::shared_ptr<const FrameOrigin> origin_;

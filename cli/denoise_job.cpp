@@ -126,6 +126,7 @@ DenoiseJob jobWithoutPlan(const DenoiseRequest& request, const Sequence& sequenc
   job.source = sourceOptions(request);
   job.memory = request.memory;
   job.overlap = overlap;
+  job.claims = sequence.pattern.numbered();
   job.overwrite = request.overwrite;
   job.settings = describeSettings(request, job.source);
   return job;

@@ -57,16 +57,19 @@ class SequenceRun {
     report.stats.seconds["read"] += chunk.seconds;
     report.seconds += chunk.seconds;
     ++report.bands;
-    if (chunk.error.empty() && !chunk.kept) denoise(chunk, report);
+    if (chunk.error.empty() && !chunk.kept && !chunk.elsewhere) denoise(chunk, report);
     if (chunk.kept) {
       report.status = FrameReport::Status::Kept;
       display_.frameDone(fmt::format("{}: done before", job_.frames[chunk.frame].outputs.image));
+    } else if (chunk.elsewhere) {
+      report.status = FrameReport::Status::Elsewhere;
+      display_.frameDone(fmt::format("{}: another process is at it", job_.frames[chunk.frame].outputs.image));
     } else if (!chunk.error.empty()) {
       finishWriting();  // an earlier band of the same frame may be in it
       writer_.drop();
       failed(chunk);
     }
-    return !chunk.kept && report.error.empty();
+    return !chunk.kept && !chunk.elsewhere && report.error.empty();
   }
 
   void denoise(Chunk& chunk, FrameReport& report) {

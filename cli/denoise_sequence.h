@@ -25,11 +25,12 @@ struct DenoiseJob {
   std::string settings;    // everything else that decides what comes out, as text to be hashed
   size_t memory = 0;       // bytes; frames that need more go through in bands of rows
   bool overlap = true;     // read and write beside the work
+  bool claims = false;     // claim frames, as other processes may work on the same sequence
   bool overwrite = false;  // replace outputs that were made otherwise
 };
 
 struct FrameReport {
-  enum class Status { Done, Kept, Failed };
+  enum class Status { Done, Kept, Elsewhere, Failed };  // Elsewhere: another process makes it
   Status status = Status::Done;
   std::string error;         // one line
   deep::DenoiseStats stats;  // of the denoiser, and the seconds of "read" and "write"

@@ -17,6 +17,8 @@ const char* nameOf(FrameReport::Status status) {
       return "done";
     case FrameReport::Status::Kept:
       return "kept";
+    case FrameReport::Status::Elsewhere:
+      return "elsewhere";
     default:
       return "failed";
   }
@@ -30,7 +32,7 @@ void writeStats(const std::string& path, const std::vector<DenoiseFrame>& frames
   Json list = Json::array();
   deep::DenoiseStats total;
   total.seconds["plan"] = planSeconds;
-  std::map<std::string, int> statuses = {{"done", 0}, {"kept", 0}, {"failed", 0}};
+  std::map<std::string, int> statuses = {{"done", 0}, {"kept", 0}, {"elsewhere", 0}, {"failed", 0}};
   for (size_t i = 0; i < reports.size(); ++i) {
     const FrameReport& report = reports[i];
     const char* status = nameOf(report.status);

@@ -28,4 +28,8 @@ class OutputFile {
   uint64_t size_ = 0;
 };
 
+// Removes what killed processes left of a file that they were writing: theirs of this machine, and of other machines what
+// nobody has touched for an hour.
+void removeAbandoned(const std::string& path);
+
 }  // namespace fathom

@@ -44,15 +44,18 @@ cli::DenoiseRequest requestOf(const Source& source, deep::Quality quality, size_
 
 QString describeReports(const std::vector<cli::FrameReport>& reports) {
   using Status = cli::FrameReport::Status;
-  int kept = 0, failed = 0;
+  int kept = 0, elsewhere = 0, failed = 0;
   std::string error;
   for (const cli::FrameReport& report : reports) {
     kept += report.status == Status::Kept;
+    elsewhere += report.status == Status::Elsewhere;
     failed += report.status == Status::Failed;
     if (error.empty()) error = report.error;
   }
-  std::string line = fmt::format("{} of {} frames denoised", int(reports.size()) - kept - failed, reports.size());
+  std::string line =
+      fmt::format("{} of {} frames denoised", int(reports.size()) - kept - elsewhere - failed, reports.size());
   if (kept > 0) line += fmt::format(", {} were done before", kept);
+  if (elsewhere > 0) line += fmt::format(", {} are made by another process", elsewhere);
   if (failed > 0) line += fmt::format(", {} failed: {}", failed, error);
   return QString::fromStdString(line);
 }
