@@ -56,13 +56,27 @@ BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_
 
 }  // namespace
 
+std::vector<std::string> baseNames(const std::string& text) {
+  return CLI::detail::split(text, ',');
+}
+
 void addBaseOptions(CLI::App& command, BaseOptions& options) {
+  const auto areNames = [](const std::string& text) {
+    const std::vector<std::string> names = baseNames(text);
+    for (const std::string& name : names) {
+      if (name != kOwnBase && name != kNeuralBase && name != kOidnBase && (name != kAutoBase || names.size() > 1))
+        return fmt::format("expected nlm, neural and oidn, or auto alone, found {}", name);
+      if (std::ranges::count(names, name) > 1) return fmt::format("expected {} once", name);
+    }
+    return std::string();
+  };
   command
       .add_option("--method,--base", options.name,
                   "The denoiser of flat frames: Fathom's own filter, its network, or Open Image Denoise where it is "
-                  "installed; auto takes the one that promises the least error on the first frame")
+                  "installed; several (nlm,oidn) are mixed by their estimated errors; auto takes the one that promises "
+                  "the least error on the first frame")
       ->type_name("nlm|neural|oidn|auto")
-      ->check(CLI::IsMember({kOwnBase, kNeuralBase, kOidnBase, kAutoBase}).description(""))
+      ->check(CLI::Validator(areNames, ""))
       ->default_str(options.name);
   command
       .add_option(

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "deep/denoise.h"
 #include "flat/denoiser.h"
@@ -27,11 +28,14 @@ constexpr const char* kNeuralBase = "neural";
 constexpr const char* kAutoBase = "auto";  // one of the others: see cli/method_choice
 
 struct BaseOptions {
-  std::string name = kOwnBase;
+  std::string name = kOwnBase;           // or several, with commas between them
   std::string oidnLibrary = {};  // file or folder; empty: see flat::loadOidn
   std::string model = {};        // name or file; empty: see defaultModel
   int components = 0;            // of the network: 1, 2, 4; 0: see flat::NeuralParams
 };
+
+// The names in an option's value.
+std::vector<std::string> baseNames(const std::string& text);
 
 // Adds --method (or --base, as it was called), --model, --components and --oidn-library.
 void addBaseOptions(CLI::App& command, BaseOptions& options);

@@ -17,6 +17,11 @@
 // - The error of the mix is estimated with it (equation 8).
 #pragma once
 
+#include <array>
+#include <functional>
+#include <span>
+#include <vector>
+
 #include "flat/error_map.h"
 #include "flat/gate.h"
 
@@ -33,11 +38,35 @@ struct ProgressiveParams {
 // finite, stands the denoised value (0 where that is not finite either).
 Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorMap& map, const Buffer<float>& k);
 
-// The last steps, with what was estimated of `denoised`.
-Image mixByEstimate(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorEstimate& estimate,
+// A denoised render, and what is known of it without a reference.
+struct Candidate {
+  Image denoised;  // R, G, B
+  ErrorMap map;
+  std::array<Buffer<float>, 3> spread;  // as ErrorEstimate has it
+  Buffer<float> k;                      // the gate's
+};
+
+// What a denoiser makes of a render, and how wrong that is.
+struct Answer {
+  Image denoised;
+  ErrorEstimate estimate;
+};
+using Estimator = std::function<Answer(const Image& noisy, const Noise& noise, const Progress& progress)>;
+
+// By 1 + probes runs of the denoiser.
+Estimator byProbes(Denoiser denoiser, const SureParams& params = {});
+
+Candidate makeCandidate(const Image& noisy, const Noise& noise, Answer answer, const ProgressiveParams& params = {});
+
+// One after the other; their part of the progress is about that of their time.
+std::vector<Candidate> makeCandidates(const Image& noisy, const Noise& noise, std::span<const Estimator> estimators,
+                                      const ProgressiveParams& params = {}, const Progress& progress = {});
+
+// The mix of the render and one candidate or more.
+Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Candidate> candidates,
                     const ProgressiveParams& params = {});
 
-// All steps, for a render that says something of its noise (see noiseOf): 1 + probes runs of the denoiser.
+// All steps with one denoiser, for a render that says something of its noise (see noiseOf).
 Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params = {},
                            const Progress& progress = {});
 
