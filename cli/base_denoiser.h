@@ -28,7 +28,7 @@ constexpr const char* kNeuralBase = "neural";
 constexpr const char* kAutoBase = "auto";  // one of the others: see cli/method_choice
 
 struct BaseOptions {
-  std::string name = kOwnBase;           // or several, with commas between them
+  std::string name = kOwnBase;   // or several, with commas between them
   std::string oidnLibrary = {};  // file or folder; empty: see flat::loadOidn
   std::string model = {};        // name or file; empty: see defaultModel
   int components = 0;            // of the network: 1, 2, 4; 0: see flat::NeuralParams

@@ -66,9 +66,9 @@ std::vector<NamedBase> basesOf(const ProgressiveRequest& request, const std::str
 // All that decides what comes out, beside the contents of the inputs.
 std::string describeSettings(const ProgressiveRequest& request, const std::vector<NamedBase>& bases,
                              const SourceOptions& source) {
-  std::string text = fmt::format("progressive quality {} probes {} errors {} features {} halves {}",
-                                 int(request.quality), request.probes, request.errors, !request.features.empty(),
-                                 request.halves.size());
+  std::string text =
+      fmt::format("progressive quality {} probes {} errors {} features {} halves {}", int(request.quality),
+                  request.probes, request.errors, !request.features.empty(), request.halves.size());
   for (const NamedBase& base : bases) text += " base " + (base.common ? base.common->settings : base.name);
   if (source.map)
     for (const ChannelMap::Line& line : source.map->lines) {
@@ -271,8 +271,7 @@ std::vector<PassReport> runProgressive(const ProgressiveRequest& request, const 
   std::vector<PassReport> reports;
   for (const int frame : sequence.frames) {
     if (stop.stop_requested()) throw Cancelled();
-    reports.push_back(
-        run.run(inputsAt(request, sequence.pattern, frame), output.at(frame), candidatesAt(frame)));
+    reports.push_back(run.run(inputsAt(request, sequence.pattern, frame), output.at(frame), candidatesAt(frame)));
     done(reports.back());
   }
   return reports;

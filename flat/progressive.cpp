@@ -1,25 +1,32 @@
 #include "flat/progressive.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
 #include "base/parallel.h"
 #include "flat/finite.h"
+#include "flat/mix_planes.h"
 
 namespace fathom::flat {
 
 namespace {
+
+constexpr float kTiny = 1e-30f;  // of errors
+constexpr float kPower = 2;      // of estimated errors in weights; nn/train/mix_model.py has the same
+constexpr float kMostOdds = 10;  // logarithm
 
 // How many times too small the variance that so many samples give may be; 1 where their number is not known.
 float doubt(float samples) {
   return samples > 1 ? (samples + 11) / (samples - 1) : 1;
 }
 
-// How much of the denoised value is taken: equation 9, or all where both are equally good.
-float shareOf(float error, float variance, float covariance) {
-  const float all = error + variance - 2 * covariance;
-  return all > 0 ? std::clamp((variance - covariance) / all, 0.0f, 1.0f) : 1.0f;
+// How much of the denoised value is taken: equation 9, or all where both are equally good; its odds times `odds`.
+float shareOf(float error, float variance, float covariance, float odds) {
+  const float ours = odds * std::max(variance - covariance, 0.0f), theirs = std::max(error - covariance, 0.0f);
+  return theirs > 0 ? ours / (ours + theirs) : 1.0f;
 }
 
 // Equation 8.
@@ -28,9 +35,10 @@ float errorOf(float share, float error, float variance, float covariance) {
   return std::max(rest * rest * variance + share * share * error + 2 * share * rest * covariance, 0.0f);
 }
 
-// Weights of candidates in a pixel: the inverses of their errors, summed over channels.
-void weigh(std::span<const Candidate> candidates, size_t i, std::span<float> weights) {
-  float sum = 0;
+// Weights of candidates in a pixel, which sum to 1. `logits`: what the network says of each, or nothing.
+void weigh(std::span<const Candidate> candidates, const std::vector<Buffer<float>>& logits, size_t i,
+           std::span<float> weights) {
+  float most = -std::numeric_limits<float>::infinity();
   for (size_t n = 0; n < candidates.size(); ++n) {
     float error = 0;
     bool finite = true;
@@ -38,49 +46,60 @@ void weigh(std::span<const Candidate> candidates, size_t i, std::span<float> wei
       error += candidates[n].map.error[c][i];
       finite = finite && isFinite(candidates[n].denoised.get(kRgbNames[c]).values[i]);
     }
-    weights[n] = finite ? 1 / std::max(error, 1e-30f) : 0;
-    sum += weights[n];
+    const float logit = -kPower * std::log(std::max(error, kTiny)) + (logits.empty() ? 0 : logits[n][i]);
+    weights[n] = finite ? logit : -std::numeric_limits<float>::infinity();
+    most = std::max(most, weights[n]);
   }
-  for (float& w : weights) w = sum > 0 ? w / sum : 1 / float(weights.size());
+  float sum = 0;
+  for (float& w : weights) sum += w = std::exp(w - most);
+  for (float& w : weights) w = sum > 0 ? w / sum : 1 / float(weights.size());  // none is finite: NaN stays
 }
 
 // The candidates' weighted mean as one of them. Its error is the mean one less how far they are apart (exact for true
 // errors, by the ambiguity decomposition of Krogh and Vedelsby 1995), but not less than what independent errors leave.
-Candidate merge(std::span<const Candidate> candidates) {
+Candidate merge(std::span<const Candidate> candidates, const std::vector<Buffer<float>>& logits) {
   const Image& like = candidates[0].denoised;
-  const size_t pixels = like.dataWindow.area();
-  Candidate result{{like.dataWindow, like.displayWindow, {}, {}}, {}, {}, {}};
+  const Box& window = like.dataWindow;
+  Candidate result{{window, like.displayWindow, {}, {}}, {}, {}, {}};
+  std::array<float*, 3> means;
+  for (const char* name : kRgbNames) result.denoised.add(name);
   for (size_t c = 0; c < 3; ++c) {
-    result.denoised.add(kRgbNames[c]);
+    means[c] = result.denoised.find(kRgbNames[c])->values.data();
     for (auto* planes : {&result.map.error, &result.map.variance, &result.map.covariance})
-      (*planes)[c] = Buffer<float>(pixels, 0.0f);
+      (*planes)[c] = Buffer<float>(window.area());
   }
-  std::vector<float> weights(candidates.size());
-  for (size_t i = 0; i < pixels; ++i) {
-    weigh(candidates, i, weights);
-    for (size_t c = 0; c < 3; ++c) {
-      float mean = 0, apart = 0, least = 0;
-      for (size_t n = 0; n < candidates.size(); ++n) {
-        const ErrorMap& map = candidates[n].map;
-        const float w = weights[n], y = candidates[n].denoised.get(kRgbNames[c]).values[i];
-        if (w > 0) mean += w * y;
-        if (w > 0) apart += w * y * y;
-        result.map.error[c][i] += w * map.error[c][i];
-        result.map.variance[c][i] += w * map.variance[c][i];
-        result.map.covariance[c][i] += w * map.covariance[c][i];
-        least += w * w * map.error[c][i];
+  parallelFor(0, window.height(), [&](int row) {
+    std::vector<float> weights(candidates.size());
+    for (size_t i = size_t(row) * size_t(window.width()); i < size_t(row + 1) * size_t(window.width()); ++i) {
+      weigh(candidates, logits, i, weights);
+      for (size_t c = 0; c < 3; ++c) {
+        float mean = 0, square = 0, error = 0, least = 0, variance = 0, covariance = 0;
+        for (size_t n = 0; n < candidates.size(); ++n) {
+          const ErrorMap& map = candidates[n].map;
+          const float w = weights[n], y = candidates[n].denoised.get(kRgbNames[c]).values[i];
+          if (!(w > 0)) continue;
+          mean += w * y;
+          square += w * y * y;
+          error += w * map.error[c][i];
+          least += w * w * map.error[c][i];
+          variance += w * map.variance[c][i];
+          covariance += w * map.covariance[c][i];
+        }
+        const float apart = std::max(square - mean * mean, 0.0f);
+        means[c][i] = mean;
+        result.map.error[c][i] = apart < kLargest ? std::max(error - apart, least) : error;
+        result.map.variance[c][i] = variance;
+        result.map.covariance[c][i] = covariance;
       }
-      float& error = result.map.error[c][i];
-      error = std::max(error - std::max(apart - mean * mean, 0.0f), least);
-      result.denoised.find(kRgbNames[c])->values[i] = mean;
     }
-  }
+  });
   return result;
 }
 
 }  // namespace
 
-Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorMap& map, const Buffer<float>& k) {
+Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorMap& map, const Buffer<float>& k,
+          const Buffer<float>& odds) {
   Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
   for (const char* name : kRgbNames) result.add(name);
   const int width = noisy.dataWindow.width();
@@ -100,8 +119,9 @@ Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const E
         } else {
           const float variance = std::max(map.variance[c][i], noise.variance[c][i]);
           const float doubtful = doubt(noise.samples[i]);
-          const float share =
-              std::min(shareOf(map.error[c][i], doubtful * variance, map.covariance[c][i]), 1 - k[i] / doubtful);
+          const float changed = odds.empty() ? 1 : std::exp(std::clamp(odds[i], -kMostOdds, kMostOdds));
+          const float share = std::min(shareOf(map.error[c][i], doubtful * variance, map.covariance[c][i], changed),
+                                       1 - k[i] / doubtful);
           values[i] = share < 1 ? x[i] + share * (y[i] - x[i]) : y[i];
           errors[i] = errorOf(share, map.error[c][i], map.variance[c][i], map.covariance[c][i]);
         }
@@ -143,11 +163,13 @@ std::vector<Candidate> makeCandidates(const Image& noisy, const Noise& noise, st
 }
 
 Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Candidate> candidates,
-                    const ProgressiveParams& params) {
+                    const ProgressiveParams& params, const Progress& progress) {
+  nn::MixLogits logits;
+  if (params.net) logits = params.net->run(mixSource(noisy, noise, candidates), progress);
   if (candidates.size() == 1)
-    return mix(noisy, noise, candidates[0].denoised, candidates[0].map, candidates[0].k);
-  const Candidate one = merge(candidates);
-  return mix(noisy, noise, one.denoised, one.map, gate(noisy, noise, one.denoised, params.gate));
+    return mix(noisy, noise, candidates[0].denoised, candidates[0].map, candidates[0].k, logits.share);
+  const Candidate mean = merge(candidates, logits.weight);
+  return mix(noisy, noise, mean.denoised, mean.map, gate(noisy, noise, mean.denoised, params.gate), logits.share);
 }
 
 Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params,
