@@ -38,12 +38,7 @@ struct NamedBase {
 
 flat::Estimator estimatorOf(const ProgressiveRequest& request, const NamedBase& base, const flat::Image& noisy) {
   const deep::DenoisePlan plan = planOf(request, noisy);
-  if (request.probes == 0 && !base.common && deep::tellsResponse(plan))
-    return [plan](const flat::Image& image, const flat::Noise& noise, const Progress& progress) {
-      deep::FlatAnswer answer = deep::answerNlMeans(image, plan, progress);
-      flat::ErrorEstimate estimate = flat::estimateError(image, noise, answer.denoised, std::move(answer.response));
-      return flat::Answer{std::move(answer.denoised), std::move(estimate)};
-    };
+  if (request.probes == 0 && !base.common && deep::tellsResponse(plan)) return deep::nlMeansEstimator(plan);
   flat::SureParams params;
   if (request.probes > 0) params.probes = request.probes;
   return flat::byProbes(base.common ? base.common->denoise : deep::flatNlMeans(plan), params);
@@ -65,9 +60,9 @@ std::vector<NamedBase> basesOf(const ProgressiveRequest& request, const std::str
 
 // All that decides what comes out, beside the contents of the inputs.
 std::string describeSettings(const ProgressiveRequest& request, const std::vector<NamedBase>& bases,
-                             const SourceOptions& source) {
+                             const std::string& mix, const SourceOptions& source) {
   std::string text =
-      fmt::format("progressive quality {} probes {} errors {} features {} halves {}", int(request.quality),
+      fmt::format("progressive mix {} quality {} probes {} errors {} features {} halves {}", int(request.quality),
                   request.probes, request.errors, !request.features.empty(), request.halves.size());
   for (const NamedBase& base : bases) text += " base " + (base.common ? base.common->settings : base.name);
   if (source.map)
@@ -153,7 +148,9 @@ class ProgressiveRun {
     if (!request.map.empty()) options_.map = readChannelMap(request.map);
     options_.memory = request.memory;
     bases_ = basesOf(request, request.base.name == kAutoBase ? chooseBase(passes) : request.base.name);
-    settings_ = describeSettings(request, bases_, options_);
+    const MixChoice mix = mixOf(request.base);
+    params_.net = mix.net;
+    settings_ = describeSettings(request, bases_, mix.settings, options_);
   }
 
   // `candidates`: a file for them, or none.
@@ -207,7 +204,7 @@ class ProgressiveRun {
           "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "
           "replaces it)",
           report.output);
-    if (standing == Standing::Ours && !request_.estimates) {
+    if (standing == Standing::Ours && !request_.estimates && candidateFile.empty()) {
       report.status = PassReport::Status::Kept;
       return;
     }
@@ -217,14 +214,13 @@ class ProgressiveRun {
     std::vector<flat::Estimator> estimators;
     for (const NamedBase& base : bases_) estimators.push_back(estimatorOf(request_, base, noisy));
     std::vector<flat::Candidate> candidates = flat::makeCandidates(noisy, noise, estimators, {}, progress);
-    flat::Image mixed = flat::mixCandidates(noisy, noise, candidates);
+    flat::Image mixed = flat::mixCandidates(noisy, noise, candidates, params_);
     report.errors = flat::summarizeErrors(mixed, noise);
     report.spp = flat::sppOf(noisy);
-    if (standing == Standing::Ours) return;
     flat::Image output = outputOf(std::move(noisy), std::move(mixed), request_.errors);
     output.attributes[kMadeBy] = madeBy;
     if (!candidateFile.empty()) flat::write(candidateFile, candidatesOf(output, bases_, std::move(candidates)));
-    flat::write(report.output, output);
+    if (standing != Standing::Ours) flat::write(report.output, output);
   }
 
   flat::Image read(const FrameInputs& inputs) {
@@ -245,6 +241,7 @@ class ProgressiveRun {
   const std::stop_token stop_;
   SourceOptions options_;
   std::vector<NamedBase> bases_;
+  flat::ProgressiveParams params_;
   std::string settings_;
   std::set<std::string> told_;
 };

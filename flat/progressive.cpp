@@ -172,11 +172,16 @@ Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Cand
   return mix(noisy, noise, mean.denoised, mean.map, gate(noisy, noise, mean.denoised, params.gate), logits.share);
 }
 
-Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params,
+Image denoiseProgressively(const Image& noisy, std::span<const Estimator> estimators, const ProgressiveParams& params,
                            const Progress& progress) {
   const Noise noise = noiseOf(noisy);
-  const Estimator estimators[] = {byProbes(denoiser, params.sure)};
   return mixCandidates(noisy, noise, makeCandidates(noisy, noise, estimators, params, progress), params);
+}
+
+Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params,
+                           const Progress& progress) {
+  const Estimator estimators[] = {byProbes(denoiser, params.sure)};
+  return denoiseProgressively(noisy, estimators, params, progress);
 }
 
 }  // namespace fathom::flat

@@ -75,7 +75,11 @@ std::vector<Candidate> makeCandidates(const Image& noisy, const Noise& noise, st
 Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Candidate> candidates,
                     const ProgressiveParams& params = {}, const Progress& progress = {});
 
-// All steps with one denoiser, for a render that says something of its noise (see noiseOf).
+// All steps, for a render that says something of its noise (see noiseOf).
+Image denoiseProgressively(const Image& noisy, std::span<const Estimator> estimators,
+                           const ProgressiveParams& params = {}, const Progress& progress = {});
+
+// With one denoiser.
 Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params = {},
                            const Progress& progress = {});
 
