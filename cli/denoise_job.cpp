@@ -244,6 +244,9 @@ bool isGuideFile(const std::string& guide) {
 }
 
 std::string guideChoice(const DenoiseRequest& request) {
+  if (request.guide == "auto" && baseNames(request.base.name).size() > 1)
+    usage("--method", fmt::format("expected one denoiser for deep frames, whose flattened ones it guides, found {}",
+                                  request.base.name));
   const bool named = request.base.name != kOwnBase && request.base.name != kAutoBase;
   return request.guide == "auto" && named ? request.base.name : request.guide;
 }

@@ -1,6 +1,7 @@
 // The mixing network's planes against those of its training (tests/flat/mix_frames.py made the file), and laws of theirs.
 #include "flat/mix_planes.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +29,7 @@ Image storedImage(const std::string& beginning) {
 }
 
 Candidate storedCandidate(const std::string& name, const std::string& base) {
-  const Image image = storedImage(name + "/candidate/" + base + ".");
+  const Image image = storedImage(fmt::format("{}/candidate/{}.", name, base));
   Candidate candidate{{image.dataWindow, image.displayWindow, {}, {}}, {}, {}, {}};
   for (size_t c = 0; c < 3; ++c) {
     const std::string channel = kRgbNames[c];
@@ -68,16 +69,16 @@ void expectPlanes(const std::function<void(const nn::Window&, const nn::Planes&)
 TEST(MixPlanes, EqualTraining) {
   for (const std::string name : {"full", "samples", "light"}) {
     SCOPED_TRACE(name);
-    Image noisy = storedImage(name + "/in/");
-    noisy.attributes["fathom:spp"] = "8";
+    Image noisy = storedImage(fmt::format("{}/in/", name));
+    noisy.attributes.emplace("fathom:spp", "8");
     const Noise noise = noiseOf(noisy);
     const std::vector<Candidate> candidates = storedCandidates(name);
     const nn::MixSource source = mixSource(noisy, noise, candidates);
     ASSERT_EQ(source.candidates, 2);
-    expectPlanes(source.shared, stored().tensors.at(name + "/shared"));
+    expectPlanes(source.shared, stored().tensors.at(fmt::format("{}/shared", name)));
     for (int n = 0; n < 2; ++n)
       expectPlanes([&](const nn::Window& window, const nn::Planes& to) { source.own(n, window, to); },
-                   stored().tensors.at(name + "/own/" + (n ? "oidn" : "nlm")));
+                   stored().tensors.at(fmt::format("{}/own/{}", name, n ? "oidn" : "nlm")));
   }
 }
 
