@@ -1,6 +1,7 @@
 #include "cli/base_denoiser.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -10,9 +11,11 @@
 #include "cli/memory_limit.h"
 #include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
+#include "deep/noise_response.h"
 #include "flat/gate.h"
 #include "flat/neural.h"
 #include "flat/oidn.h"
+#include "flat/progressive.h"
 
 namespace fathom::cli {
 
@@ -54,15 +57,69 @@ BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_
               }};
 }
 
+// Our own filter tells its errors where it can; others are run again for that.
+flat::Estimator estimatorOf(const BaseDenoiser& base, bool own, const deep::DenoisePlan& plan) {
+  if (!own || !deep::tellsResponse(plan)) return flat::byProbes(base.denoise);
+  return deep::nlMeansEstimator(plan);
+}
+
+BaseDenoiser mixedBase(const BaseOptions& options, deep::DenoisePlan plan, size_t scratch) {
+  plan.params.gate = false;  // the mix has one of its own
+  const MixChoice mix = mixOf(options);
+  BaseDenoiser result;
+  result.settings = "mix " + mix.settings;
+  result.readsStatistics = result.gated = result.tellsErrors = true;
+  std::vector<BaseDenoiser> bases;
+  std::vector<flat::Estimator> estimators;
+  for (const std::string& name : baseNames(options.name)) {
+    BaseOptions one = options;
+    one.name = name;
+    bases.push_back(makeBase(one, plan, scratch));
+    estimators.push_back(estimatorOf(bases.back(), name == kOwnBase, plan));
+    result.settings += ", " + bases.back().settings;
+  }
+  flat::ProgressiveParams params;
+  params.net = mix.net;
+  result.denoise = [estimators, params](const flat::Image& noisy, const Progress& progress) {
+    return flat::denoiseProgressively(noisy, estimators, params, progress);
+  };
+  result.bytes = [bases, net = mix.net](size_t pixels, size_t room) {
+    size_t most = 0;  // one after the other
+    for (const BaseDenoiser& base : bases)
+      if (base.bytes) most = std::max(most, base.bytes(pixels, room));
+    const size_t threads = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    return most + mixBytes(pixels, bases.size()) + (net ? threads * net->bytesPerThread(int(bases.size())) : 0);
+  };
+  result.addCounts = [bases](std::map<std::string, uint64_t>& sums) {
+    for (const BaseDenoiser& base : bases)
+      if (base.addCounts) base.addCounts(sums);
+  };
+  return result;
+}
+
 }  // namespace
 
+std::vector<std::string> baseNames(const std::string& text) {
+  return CLI::detail::split(text, ',');
+}
+
 void addBaseOptions(CLI::App& command, BaseOptions& options) {
+  const auto areNames = [](const std::string& text) {
+    const std::vector<std::string> names = baseNames(text);
+    for (const std::string& name : names) {
+      if (name != kOwnBase && name != kNeuralBase && name != kOidnBase && (name != kAutoBase || names.size() > 1))
+        return fmt::format("expected nlm, neural and oidn, or auto alone, found {}", name);
+      if (std::ranges::count(names, name) > 1) return fmt::format("expected {} once", name);
+    }
+    return std::string();
+  };
   command
       .add_option("--method,--base", options.name,
                   "The denoiser of flat frames: Fathom's own filter, its network, or Open Image Denoise where it is "
-                  "installed; auto takes the one that promises the least error on the first frame")
+                  "installed; several (nlm,oidn) are mixed by their estimated errors; auto takes the one that promises "
+                  "the least error on the first frame")
       ->type_name("nlm|neural|oidn|auto")
-      ->check(CLI::IsMember({kOwnBase, kNeuralBase, kOidnBase, kAutoBase}).description(""))
+      ->check(CLI::Validator(areNames, ""))
       ->default_str(options.name);
   command
       .add_option(
@@ -78,6 +135,14 @@ void addBaseOptions(CLI::App& command, BaseOptions& options) {
       ->type_name("1|2|4|auto")
       ->check(CLI::IsMember({"1", "2", "4", "auto"}).description(""))
       ->default_str("auto");
+  command
+      .add_option("--mix", options.mix,
+                  "How several denoisers are mixed, and in `fathom progressive` with the render: by a network that "
+                  "corrects a formula, or by "
+                  "the formula alone; auto takes the network where it is installed")
+      ->type_name("learned|formula|auto")
+      ->check(CLI::IsMember({kLearnedMix, kFormulaMix, kAutoMix}).description(""))
+      ->default_str(options.mix);
   command
       .add_option("--oidn-library", options.oidnLibrary,
                   "Open Image Denoise's library, or the folder it is in (default: FATHOM_OIDN_LIBRARY, else where the "
@@ -104,7 +169,14 @@ std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path) {
   }
 }
 
+MixChoice mixOf(const BaseOptions& options) {
+  if (options.mix == kFormulaMix || (options.mix == kAutoMix && !hasMix())) return {nullptr, "formula"};
+  MixModel model = loadMix();
+  return {model.net, model.settings};
+}
+
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
+  if (baseNames(options.name).size() > 1) return mixedBase(options, plan, scratch);
   if (options.name != kOidnBase && options.name != kNeuralBase)
     return {.denoise = deep::flatNlMeans(plan), .settings = describeFilter(plan)};
   const bool oidn = options.name == kOidnBase;

@@ -60,7 +60,8 @@ size_t wholeFrameBytes(FrameSource& source, const SequencePlan& plan, size_t mem
   const GuideBytes guide = bytesOfGuide(plan, window.area(), memory);
   const size_t library =
       plan.base && plan.base->bytes ? plan.base->bytes(window.area(), decodedLimit(memory)) : guide.library;
-  return Rows(source, imagesInMemory(plan.errors), guide.madePerPixel).bytes(window.y0, window.y1) + library;
+  const bool errors = plan.errors || (plan.base && plan.base->tellsErrors);
+  return Rows(source, imagesInMemory(errors), guide.madePerPixel).bytes(window.y0, window.y1) + library;
 }
 
 // How much would do, where `memory` does not: libraries take more where they may.

@@ -143,15 +143,20 @@ flat::Image toFlatFrame(deep::DeepImage image, std::map<std::string, std::string
 // What denoises flat frames in the place of our own filter.
 void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   const std::string& name = request.base.name;
-  if (request.split && name == kOidnBase)
+  const bool apart = name == kNeuralBase;
+  if (request.split && !apart)
     usage("--split", fmt::format("expected a --method that keeps components apart, found {}", name));
   plan.base = makeBase(request.base, plan.denoise, decodedLimit(request.memory));
   const deep::DenoiseInputs& inputs = plan.denoise.inputs;
   const auto note = [&](const std::string& line) { plan.notes.insert(fmt::format("{}: {}", plan.first, line)); };
   for (const std::string& line : deep::describeMissing(inputs))
     plan.notes.erase(fmt::format("{}: {}", plan.first, line));
+  if (!apart && inputs.components)
+    note(fmt::format("diffuse.* and specular.* are left out: {} denoises their sum", name));
   if (plan.base->readsStatistics) {
     plan.firstImage.reset();  // it has the statistics of our own filter
+    if (plan.base->tellsErrors && !inputs.variance && !inputs.halves)
+      fail("{}: expected variance.* or half0.* and half1.* for a mix, found none", plan.first);
     if (!inputs.albedo || !inputs.normal) note("no albedo.* or N.*: the network has less to go by");
     if (!inputs.variance && !inputs.halves)
       note("no variance.*, no half0.* and half1.*: the network guesses the noise");
@@ -159,7 +164,6 @@ void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   }
   if (!inputs.albedo) note("no albedo.*: the colours have no guides");
   if (inputs.albedo && !inputs.normal) note("no N.*: the albedo guides alone");
-  if (inputs.components) note(fmt::format("diffuse.* and specular.* are left out: {} denoises their sum", name));
 }
 
 // The base of flat frames, where it is to be chosen.
@@ -241,6 +245,9 @@ bool isGuideFile(const std::string& guide) {
 }
 
 std::string guideChoice(const DenoiseRequest& request) {
+  if (request.guide == "auto" && baseNames(request.base.name).size() > 1)
+    usage("--method", fmt::format("expected one denoiser for deep frames, whose flattened ones it guides, found {}",
+                                  request.base.name));
   const bool named = request.base.name != kOwnBase && request.base.name != kAutoBase;
   return request.guide == "auto" && named ? request.base.name : request.guide;
 }

@@ -113,9 +113,32 @@ deep::DeepImage denoiseTelling(deep::DeepImage image, const SequencePlan& plan, 
   return image;
 }
 
+// A flat frame with its errors, which the base tells beside its colours.
+deep::DeepImage applyTelling(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
+                             deep::DenoiseStats* stats) {
+  flat::Image errors;
+  const flat::Denoiser telling = [&](const flat::Image& noisy, const Progress& inner) {
+    flat::Image result = plan.base->denoise(noisy, inner);
+    const auto first = std::stable_partition(result.planes.begin(), result.planes.end(), [](const flat::Plane& plane) {
+      return !plane.name.starts_with("error.");
+    });
+    errors.planes.assign(std::make_move_iterator(first), std::make_move_iterator(result.planes.end()));
+    result.planes.erase(first, result.planes.end());
+    return result;
+  };
+  image = deep::applyFlat(std::move(image), telling, plan.denoise.params.keepStatistics, progress, stats);
+  if (stats && plan.base->addCounts) plan.base->addCounts(stats->counts);
+  for (flat::Plane& plane : errors.planes) {
+    image.erase(plane.name);
+    image.add(plane.name, deep::PixelType::Float).values = std::move(plane.values);
+  }
+  return image;
+}
+
 // A flat frame; with its errors, denoising is half of the progress.
 deep::DeepImage denoiseFlat(deep::DeepImage image, const SequencePlan& plan, const Progress& progress,
                             deep::DenoiseStats* stats) {
+  if (plan.errors && plan.base && plan.base->tellsErrors) return applyTelling(std::move(image), plan, progress, stats);
   if (plan.errors && runsOf(plan) == 1) return denoiseTelling(std::move(image), plan, progress, stats);
   const deep::DeepImage noisy = plan.errors ? image.copy() : deep::DeepImage();
   const double part = plan.errors ? 0.5 : 1;
@@ -163,7 +186,7 @@ SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const Sour
 }
 
 int runsOf(const SequencePlan& plan) {
-  const bool tells = !plan.deep && !plan.base && deep::tellsResponse(plan.denoise);
+  const bool tells = !plan.deep && (plan.base ? plan.base->tellsErrors : deep::tellsResponse(plan.denoise));
   return plan.errors && !tells ? 1 + flat::SureParams().probes : 1;
 }
 

@@ -35,4 +35,11 @@ inline size_t oidnBytes(size_t pixels, size_t scratch) {
   return std::min(std::max(scratch, kLeast), pixels * kPixel);
 }
 
+// Bytes that a mix of denoised images takes beside the images, but for its network: what is known of each, and what the last
+// one's errors are estimated in.
+inline size_t mixBytes(size_t pixels, size_t candidates) {
+  constexpr size_t kCandidate = 72, kEstimate = 300;
+  return pixels * (candidates * kCandidate + kEstimate);
+}
+
 }  // namespace fathom::cli

@@ -18,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kVariable = "FATHOM_MODELS";
+constexpr const char* kMixModel = "mix";
 constexpr const char* kSuffix = ".safetensors";
 
 std::string textOf(const nn::WeightFile& file, const std::string& key) {
@@ -30,6 +31,12 @@ std::string installed(const std::string& name) {
   for (const std::string& path : findModels())
     if (fs::path(path).stem() == name) return path;
   return {};
+}
+
+std::string hashOf(const std::string& path) {
+  ContentHash hash;
+  hash.addFile(path);
+  return fmt::format("network {:016x}", hash.value());
 }
 
 std::string pathOf(const std::string& model) {
@@ -75,10 +82,30 @@ Model loadModel(const std::string& model, nn::Precision precision) {
   result.name = textOf(file, "name");
   result.steps = textOf(file, "steps");
   result.licence = textOf(file, "licence");
-  ContentHash hash;
-  hash.addFile(result.path);
-  result.settings = fmt::format("network {:016x}", hash.value());
+  result.settings = hashOf(result.path);
   return result;
+}
+
+bool hasMix() {
+  return !installed(kMixModel).empty();
+}
+
+MixModel loadMix() {
+  MixModel result;
+  result.path = installed(kMixModel);
+  if (result.path.empty())
+    fail("--mix learned: expected {}{} in {}; found none", kMixModel, kSuffix, fmt::join(modelFolders(), " or "));
+  const nn::WeightFile file = nn::readWeights(result.path);
+  result.net = std::make_shared<nn::MixNet>(file);
+  for (const auto& [name, tensor] : file.tensors) result.parameters += tensor.values.size();
+  result.steps = textOf(file, "steps");
+  result.licence = textOf(file, "licence");
+  result.settings = hashOf(result.path);
+  return result;
+}
+
+bool isMix(const std::string& path) {
+  return textOf(nn::readWeights(path), "format") == "fathom-mix";
 }
 
 std::string defaultModel(bool best) {

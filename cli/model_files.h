@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nn/compositional.h"
+#include "nn/mix.h"
 
 namespace fathom::cli {
 
@@ -26,6 +27,22 @@ struct Model {
 
 // `model`: a name that findModels finds (small, base), or a file. Throws Error where it cannot be had.
 Model loadModel(const std::string& model, nn::Precision precision = nn::Precision::float32);
+
+// The mixing network.
+struct MixModel {
+  std::string path;
+  std::shared_ptr<const nn::MixNet> net;
+  size_t parameters = 0;
+  std::string steps, licence;
+  std::string settings;
+};
+
+bool hasMix();
+// Throws Error where it is not installed or cannot be read.
+MixModel loadMix();
+
+// Whether a file says that it holds the mixing network. Throws Error where it cannot be read.
+bool isMix(const std::string& path);
 
 // The model that is meant where none is named: base for `best`, else small; where that is not installed, the other. Empty
 // where neither is.

@@ -13,7 +13,8 @@ namespace fathom::cli {
 namespace {
 
 constexpr const char* kFooter = R"(
-GFLOP are for a megapixel and K = 1, 2 and 4 components; where a frame has diffuse and specular light apart, twice as many.
+GFLOP are for a megapixel and K = 1, 2 and 4 components; where a frame has diffuse and specular light apart, twice as many;
+those of mix are for each denoiser that is mixed.
 
 Models are looked for in the folder FATHOM_MODELS, or where that is not set in share/fathom/models beside the program's
 folder, and in the source tree that it was built from.)";
@@ -22,7 +23,15 @@ std::string orUnknown(const std::string& text) {
   return text.empty() ? "-" : text;
 }
 
+void printMix() {
+  const MixModel model = loadMix();
+  fmt::print("{:<10} {:>5} {:>10} {:>18} {:>8} {:<12} {}\n", "mix", "-", model.parameters,
+             fmt::format("{:.0f}", model.net->flopPerPixel() * 1e-3), orUnknown(model.steps), orUnknown(model.licence),
+             model.path);
+}
+
 void printModel(const std::string& path) {
+  if (isMix(path)) return printMix();
   const Model model = loadModel(path);
   const auto cost = [&](int components) { return fmt::format("{:.0f}", model.net->flopPerPixel(components) * 1e-3); };
   fmt::print("{:<10} {:>5} {:>10} {:>18} {:>8} {:<12} {}\n", orUnknown(model.name), model.net->width(),

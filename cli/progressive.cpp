@@ -112,6 +112,9 @@ void addProgressive(CLI::App& app) {
       "which it tells its error by; else 2)")
       ->check(CLI::Range(1, 64).description(""));
   sub->add_flag("--error", request.errors, "Also write the estimated squared errors as error.{R,G,B}");
+  option("--candidates", request.candidates, "OUT2",
+         "Also write what each denoiser made, as nlm.{R,G,B}, and what is known of it: nlm.error.*, nlm.variance.* (of "
+         "the render) and nlm.covariance.* (of both), all smoothed, nlm.spread.* and nlm.gate");
   option("--target", command->target, "ERROR", "Say which pass is the first with an estimated relMSE within this")
       ->check(CLI::PositiveNumber.description(""));
   option("--report", command->report, "FILE", "Write the estimates as JSON, of frames and of tiles of 64x64 pixels");

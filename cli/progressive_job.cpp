@@ -30,34 +30,41 @@ deep::DenoisePlan planOf(const ProgressiveRequest& request, const flat::Image& n
   return deep::planFlat(noisy, {.quality = request.quality, .gate = false});
 }
 
-// The mix of the render and what its base, our own filter where there is none, makes of it.
-flat::Image mixOf(const ProgressiveRequest& request, const std::optional<BaseDenoiser>& base, const flat::Image& noisy,
-                  const flat::Noise& noise, const Progress& progress) {
+// A denoiser of the request. None but its name: our own filter, which is decided by the quality and each image.
+struct NamedBase {
+  std::string name;
+  std::optional<BaseDenoiser> common;  // of all images
+};
+
+flat::Estimator estimatorOf(const ProgressiveRequest& request, const NamedBase& base, const flat::Image& noisy) {
   const deep::DenoisePlan plan = planOf(request, noisy);
-  if (request.probes == 0 && !base && deep::tellsResponse(plan)) {
-    deep::FlatAnswer answer = deep::answerNlMeans(noisy, plan, progress);
-    return flat::mixByEstimate(noisy, noise, answer.denoised,
-                               flat::estimateError(noisy, noise, answer.denoised, std::move(answer.response)));
-  }
-  flat::ProgressiveParams params;
-  if (request.probes > 0) params.sure.probes = request.probes;
-  return flat::denoiseProgressively(noisy, base ? base->denoise : deep::flatNlMeans(plan), params, progress);
+  if (request.probes == 0 && !base.common && deep::tellsResponse(plan)) return deep::nlMeansEstimator(plan);
+  flat::SureParams params;
+  if (request.probes > 0) params.probes = request.probes;
+  return flat::byProbes(base.common ? base.common->denoise : deep::flatNlMeans(plan), params);
 }
 
-// What is the base of all images; none: our own filter, which is decided by the quality and each image.
-std::optional<BaseDenoiser> commonBase(const ProgressiveRequest& request, const BaseOptions& options) {
-  if (options.name == kOwnBase) return {};
+std::vector<NamedBase> basesOf(const ProgressiveRequest& request, const std::string& names) {
+  std::vector<NamedBase> bases;
   deep::DenoisePlan plan;
-  plan.params.quality = request.quality;
-  return makeBase(options, plan, request.memory / 2);
+  plan.params = {.quality = request.quality, .gate = false};
+  for (const std::string& name : baseNames(names)) {
+    NamedBase& base = bases.emplace_back(NamedBase{name, {}});
+    if (name == kOwnBase) continue;
+    BaseOptions options = request.base;
+    options.name = name;
+    base.common = makeBase(options, plan, request.memory / 2);
+  }
+  return bases;
 }
 
 // All that decides what comes out, beside the contents of the inputs.
-std::string describeSettings(const ProgressiveRequest& request, const std::optional<BaseDenoiser>& base,
-                             const SourceOptions& source) {
-  std::string text = fmt::format("progressive base {} quality {} probes {} errors {} features {} halves {}",
-                                 base ? base->settings : kOwnBase, int(request.quality), request.probes, request.errors,
-                                 !request.features.empty(), request.halves.size());
+std::string describeSettings(const ProgressiveRequest& request, const std::vector<NamedBase>& bases,
+                             const std::string& mix, const SourceOptions& source) {
+  std::string text =
+      fmt::format("progressive mix {} quality {} probes {} errors {} features {} halves {}", int(request.quality),
+                  request.probes, request.errors, !request.features.empty(), request.halves.size());
+  for (const NamedBase& base : bases) text += " base " + (base.common ? base.common->settings : base.name);
   if (source.map)
     for (const ChannelMap::Line& line : source.map->lines) {
       text += fmt::format("\n{} ={}", line.ours, line.unpremultiplied ? " unpremultiplied" : "");
@@ -73,13 +80,13 @@ FrameInputs inputsAt(const ProgressiveRequest& request, const FilePattern& input
   return inputs;
 }
 
-FilePattern outputPattern(const ProgressiveRequest& request, const FilePattern& input) {
-  FilePattern pattern = parsePattern(request.output);
-  if (!request.output.ends_with(".exr"))
-    throw CLI::ValidationError("-o", fmt::format("expected a name that ends in .exr, found {}", request.output));
+FilePattern outputPattern(const std::string& option, const std::string& path, const FilePattern& input) {
+  FilePattern pattern = parsePattern(path);
+  if (!path.ends_with(".exr"))
+    throw CLI::ValidationError(option, fmt::format("expected a name that ends in .exr, found {}", path));
   if (pattern.numbered() != input.numbered())
-    throw CLI::ValidationError("-o", fmt::format("expected a {} name like the input's, found {}",
-                                                 input.numbered() ? "numbered" : "plain", request.output));
+    throw CLI::ValidationError(option, fmt::format("expected a {} name like the input's, found {}",
+                                                   input.numbered() ? "numbered" : "plain", path));
   return pattern;
 }
 
@@ -110,6 +117,28 @@ flat::Image outputOf(flat::Image noisy, flat::Image mixed, bool errors) {
   return noisy;
 }
 
+// All candidates as one image, with the attributes of `output`.
+flat::Image candidatesOf(const flat::Image& output, const std::vector<NamedBase>& bases,
+                         std::vector<flat::Candidate> candidates) {
+  flat::Image image{output.dataWindow, output.displayWindow, {}, output.attributes};
+  for (size_t n = 0; n < candidates.size(); ++n) {
+    flat::Candidate& from = candidates[n];
+    const auto put = [&](const std::string& what, Buffer<float>& values) {
+      image.planes.push_back({bases[n].name + "." + what, std::move(values)});
+    };
+    for (size_t c = 0; c < 3; ++c) {
+      const std::string channel = flat::kRgbNames[c];
+      put(channel, from.denoised.find(channel)->values);
+      put("error." + channel, from.map.error[c]);
+      put("variance." + channel, from.map.variance[c]);
+      put("covariance." + channel, from.map.covariance[c]);
+      put("spread." + channel, from.spread[c]);
+    }
+    put("gate", from.k);
+  }
+  return image;
+}
+
 class ProgressiveRun {
  public:
   // `passes`: all that there are, of which the first that can be read decides what is left open.
@@ -118,19 +147,20 @@ class ProgressiveRun {
       : request_(request), display_(display), stop_(stop) {
     if (!request.map.empty()) options_.map = readChannelMap(request.map);
     options_.memory = request.memory;
-    BaseOptions base = request.base;
-    if (base.name == kAutoBase) base.name = chooseBase(passes);
-    base_ = commonBase(request, base);
-    settings_ = describeSettings(request, base_, options_);
+    bases_ = basesOf(request, request.base.name == kAutoBase ? chooseBase(passes) : request.base.name);
+    const MixChoice mix = mixOf(request.base);
+    params_.net = mix.net;
+    settings_ = describeSettings(request, bases_, mix.settings, options_);
   }
 
-  PassReport run(const FrameInputs& inputs, const std::string& output) {
+  // `candidates`: a file for them, or none.
+  PassReport run(const FrameInputs& inputs, const std::string& output, const std::string& candidates) {
     PassReport report;
     report.input = inputs.main;
     report.output = output;
     const Stopwatch watch;
     try {
-      work(inputs, report);
+      work(inputs, candidates, report);
     } catch (const Cancelled&) {
       throw;
     } catch (const std::bad_alloc&) {
@@ -163,7 +193,7 @@ class ProgressiveRun {
     return kOwnBase;
   }
 
-  void work(const FrameInputs& inputs, PassReport& report) {
+  void work(const FrameInputs& inputs, const std::string& candidateFile, PassReport& report) {
     ContentHash hash;
     for (const std::string& text : {std::string(FATHOM_VERSION), settings_}) hash.add(text);
     for (const std::string& file : inputs.files()) hash.addFile(file);
@@ -174,20 +204,23 @@ class ProgressiveRun {
           "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "
           "replaces it)",
           report.output);
-    if (standing == Standing::Ours && !request_.estimates) {
+    if (standing == Standing::Ours && !request_.estimates && candidateFile.empty()) {
       report.status = PassReport::Status::Kept;
       return;
     }
     flat::Image noisy = read(inputs);
     const flat::Noise noise = flat::noiseOf(noisy);
     const Progress progress{[&](double done) { display_.at(done); }, stop_};
-    flat::Image mixed = mixOf(request_, base_, noisy, noise, progress);
+    std::vector<flat::Estimator> estimators;
+    for (const NamedBase& base : bases_) estimators.push_back(estimatorOf(request_, base, noisy));
+    std::vector<flat::Candidate> candidates = flat::makeCandidates(noisy, noise, estimators, {}, progress);
+    flat::Image mixed = flat::mixCandidates(noisy, noise, candidates, params_);
     report.errors = flat::summarizeErrors(mixed, noise);
     report.spp = flat::sppOf(noisy);
-    if (standing == Standing::Ours) return;
     flat::Image output = outputOf(std::move(noisy), std::move(mixed), request_.errors);
     output.attributes[kMadeBy] = madeBy;
-    flat::write(report.output, output);
+    if (!candidateFile.empty()) flat::write(candidateFile, candidatesOf(output, bases_, std::move(candidates)));
+    if (standing != Standing::Ours) flat::write(report.output, output);
   }
 
   flat::Image read(const FrameInputs& inputs) {
@@ -207,7 +240,8 @@ class ProgressiveRun {
   ProgressSink& display_;
   const std::stop_token stop_;
   SourceOptions options_;
-  std::optional<BaseDenoiser> base_;
+  std::vector<NamedBase> bases_;
+  flat::ProgressiveParams params_;
   std::string settings_;
   std::set<std::string> told_;
 };
@@ -217,8 +251,16 @@ class ProgressiveRun {
 std::vector<PassReport> runProgressive(const ProgressiveRequest& request, const Sequence& sequence,
                                        ProgressSink& display, const std::stop_token& stop,
                                        const std::function<void(const PassReport&)>& done) {
-  const FilePattern output = outputPattern(request, sequence.pattern);
-  for (const int frame : sequence.frames) expectOtherThan(inputsAt(request, sequence.pattern, frame), output.at(frame));
+  const FilePattern output = outputPattern("-o", request.output, sequence.pattern);
+  const auto candidatesAt = [&](int frame) {
+    if (request.candidates.empty()) return std::string();
+    return outputPattern("--candidates", request.candidates, sequence.pattern).at(frame);
+  };
+  for (const int frame : sequence.frames) {
+    const FrameInputs inputs = inputsAt(request, sequence.pattern, frame);
+    expectOtherThan(inputs, output.at(frame));
+    expectOtherThan(inputs, candidatesAt(frame));
+  }
   std::vector<FrameInputs> passes;
   for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
     passes.push_back(inputsAt(request, sequence.pattern, frame));
@@ -226,7 +268,7 @@ std::vector<PassReport> runProgressive(const ProgressiveRequest& request, const 
   std::vector<PassReport> reports;
   for (const int frame : sequence.frames) {
     if (stop.stop_requested()) throw Cancelled();
-    reports.push_back(run.run(inputsAt(request, sequence.pattern, frame), output.at(frame)));
+    reports.push_back(run.run(inputsAt(request, sequence.pattern, frame), output.at(frame), candidatesAt(frame)));
     done(reports.back());
   }
   return reports;

@@ -23,6 +23,7 @@ struct ProgressiveRequest {
   BaseOptions base;
   deep::Quality quality = deep::Quality::Balanced;
   int probes = 0;          // 0: none where the base tells its error by itself, else as many as flat::SureParams has
+  std::string candidates;  // where what is mixed goes, with its estimates
   bool errors = false;     // error.{R,G,B} in the outputs
   bool estimates = false;  // wanted even of outputs that are done
   bool overwrite = false;

@@ -71,6 +71,14 @@ FlatAnswer answerNlMeans(const flat::Image& noisy, const DenoisePlan& plan, cons
   return answer;
 }
 
+flat::Estimator nlMeansEstimator(const DenoisePlan& plan) {
+  return [plan](const flat::Image& noisy, const flat::Noise& noise, const Progress& progress) {
+    FlatAnswer answer = answerNlMeans(noisy, plan, progress);
+    flat::ErrorEstimate estimate = flat::estimateError(noisy, noise, answer.denoised, std::move(answer.response));
+    return flat::Answer{std::move(answer.denoised), std::move(estimate)};
+  };
+}
+
 void addErrors(const DeepImage& noisy, const DenoiseInputs& inputs, const flat::Denoiser& denoiser,
                const Progress& progress, DeepImage& denoised) {
   addPlanes(flat::errorPlanes(pixelsOf(noisy, inputs), pixelsOf(denoised, inputs), denoiser, {}, progress), denoised);

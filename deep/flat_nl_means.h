@@ -3,7 +3,7 @@
 #pragma once
 
 #include "deep/denoise.h"
-#include "flat/sure.h"
+#include "flat/progressive.h"
 
 namespace fathom::deep {
 
@@ -22,6 +22,9 @@ struct FlatAnswer {
   flat::NoiseResponse response;
 };
 FlatAnswer answerNlMeans(const flat::Image& noisy, const DenoisePlan& plan, const Progress& progress = {});
+
+// The same with its estimated errors.
+flat::Estimator nlMeansEstimator(const DenoisePlan& plan);
 
 // Adds error.{R,G,B}, the estimated squared errors of `denoised`, which the denoiser made of `noisy`. Both hold one opaque
 // bin per pixel, as makeOneBin leaves them, and the whole frame.

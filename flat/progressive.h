@@ -15,10 +15,21 @@
 //   tails: it doubled the error of one frame. Convergence has the same reason: the variance of the mean residual falls,
 //   and what bias there is is taken back.
 // - The error of the mix is estimated with it (equation 8).
+// - Several denoised images are first mixed with one another, by the inverse squares of their estimated errors (the
+//   inverses are best for errors that have nothing in common, which those of denoisers have), then with the render.
+// - A network (nn/mix) may correct both: the logarithms of the weights of denoised images, and of the odds of their
+//   mean against the render. The gate has the last word, so that the law of convergence holds whatever it says.
 #pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
 
 #include "flat/error_map.h"
 #include "flat/gate.h"
+#include "nn/mix.h"
 
 namespace fathom::flat {
 
@@ -26,18 +37,49 @@ struct ProgressiveParams {
   SureParams sure;
   ErrorMapParams map;
   GateParams gate;
+  std::shared_ptr<const nn::MixNet> net = {};  // corrects weights and shares, where it is given
 };
 
 // The mix from what is known: R, G, B, and error.R, error.G, error.B, the expected squared error of each. `k` is the
-// gate's. Converged pixels are the render itself, with an error of 0; where the noise is unknown, or the render not
+// gate's; `odds`, where it is not empty, has a logarithm by which the odds of the denoised value against the render are
+// changed. Converged pixels are the render itself, with an error of 0; where the noise is unknown, or the render not
 // finite, stands the denoised value (0 where that is not finite either).
-Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorMap& map, const Buffer<float>& k);
+Image mix(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorMap& map, const Buffer<float>& k,
+          const Buffer<float>& odds = {});
 
-// The last steps, with what was estimated of `denoised`.
-Image mixByEstimate(const Image& noisy, const Noise& noise, const Image& denoised, const ErrorEstimate& estimate,
-                    const ProgressiveParams& params = {});
+// A denoised render, and what is known of it without a reference.
+struct Candidate {
+  Image denoised;  // R, G, B
+  ErrorMap map;
+  std::array<Buffer<float>, 3> spread;  // as ErrorEstimate has it
+  Buffer<float> k;                      // the gate's
+};
 
-// All steps, for a render that says something of its noise (see noiseOf): 1 + probes runs of the denoiser.
+// What a denoiser makes of a render, and how wrong that is.
+struct Answer {
+  Image denoised;
+  ErrorEstimate estimate;
+};
+using Estimator = std::function<Answer(const Image& noisy, const Noise& noise, const Progress& progress)>;
+
+// By 1 + probes runs of the denoiser.
+Estimator byProbes(Denoiser denoiser, const SureParams& params = {});
+
+Candidate makeCandidate(const Image& noisy, const Noise& noise, Answer answer, const ProgressiveParams& params = {});
+
+// One after the other; their part of the progress is about that of their time.
+std::vector<Candidate> makeCandidates(const Image& noisy, const Noise& noise, std::span<const Estimator> estimators,
+                                      const ProgressiveParams& params = {}, const Progress& progress = {});
+
+// The mix of the render and one candidate or more, whose order does not matter.
+Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Candidate> candidates,
+                    const ProgressiveParams& params = {}, const Progress& progress = {});
+
+// All steps, for a render that says something of its noise (see noiseOf).
+Image denoiseProgressively(const Image& noisy, std::span<const Estimator> estimators,
+                           const ProgressiveParams& params = {}, const Progress& progress = {});
+
+// With one denoiser.
 Image denoiseProgressively(const Image& noisy, const Denoiser& denoiser, const ProgressiveParams& params = {},
                            const Progress& progress = {});
 

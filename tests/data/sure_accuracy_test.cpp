@@ -75,7 +75,7 @@ TEST_P(SureAccuracy, SumAndMapFollowTheTruth) {
 TEST_P(SureAccuracy, TheFiltersOwnEstimateFollowsTheTruth) {
   deep::FlatAnswer answer = deep::answerNlMeans(noisy, deep::planFlat(noisy, {.gate = false}));
   const Image& denoised = answer.denoised;
-  const ErrorEstimate estimate = estimateError(noisy, noise, denoised, std::move(answer.response));
+  ErrorEstimate estimate = estimateError(noisy, noise, denoised, std::move(answer.response));
   const ErrorEstimate probes = estimateError(noisy, noise, denoised, denoiser);
   const PixelMap errors = truth(denoised);
   EXPECT_NEAR(std::log(sum(total(estimate.covariance)) / sum(total(probes.covariance))), -0.12, std::log(1.2));
@@ -86,7 +86,9 @@ TEST_P(SureAccuracy, TheFiltersOwnEstimateFollowsTheTruth) {
   EXPECT_NEAR(std::log(sum(map) / sum(errors)), 0, std::log(1.6));
   EXPECT_GT(spearman(boxMean(map, width, height), boxMean(errors, width, height)), 0.68);
 
-  const Image mixed = mixByEstimate(noisy, noise, denoised, estimate);
+  std::vector<Candidate> candidates;
+  candidates.push_back(makeCandidate(noisy, noise, {denoised.copy(), std::move(estimate)}));
+  const Image mixed = mixCandidates(noisy, noise, candidates);
   const double error = relMse(mixed);
   EXPECT_LT(error, 1.02 * std::min(relMse(denoised), relMse(noisy)));
   EXPECT_NEAR(summarizeErrors(mixed, noise).relMse / error, 1, 0.3);

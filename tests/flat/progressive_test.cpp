@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
+#include <span>
 
 #include "base/error.h"
 #include "flat/error_summary.h"
+#include "tests/reference/mix_net.h"
 #include "tests/reference/noisy_flat.h"
 
 namespace fathom::flat {
@@ -92,6 +95,107 @@ TEST(Progressive, ConvergesToTheTruthWithADenoiserThatDoesNot) {
     last = error;
   }
   EXPECT_LT(last, 1.1 * 0.0003 * 0.0003);
+}
+
+std::shared_ptr<const nn::MixNet> randomNet(uint32_t seed, float factor = 1) {
+  reference::PlainWeights weights = reference::randomMix(seed);
+  for (const char* name : {"weight", "share"})
+    for (float& v : weights.tensors.at(std::string(name) + ".weight").values) v *= factor;
+  return std::make_shared<nn::MixNet>(nn::readWeights(reference::safetensors(weights), "random"));
+}
+
+// The law does not depend on what is learned: with several denoisers that are all wrong, and networks that say the
+// most that they can for one or the other of them and against the render.
+TEST(Progressive, ConvergesWhateverTheNetworkSays) {
+  const Estimator estimators[] = {byProbes(biased(0.1f)), byProbes(biased(-0.2f)), byProbes(biased(0.3f))};
+  for (const uint32_t seed : {1U, 2U, 3U})
+    for (const float factor : {0.0f, 1.0f, -30.0f, 30.0f}) {
+      const float noise = 0.0003f;
+      const NoisyFlat frame = makeNoisyFlat(48, 40, 1, noise);
+      ProgressiveParams params;
+      params.net = randomNet(seed, factor);
+      const double error = squaredError(denoiseProgressively(frame.noisy, estimators, params), frame.truth);
+      EXPECT_LT(error, 1.1 * double(noise) * double(noise)) << seed << ", " << factor;
+    }
+}
+
+// Nothing learned, nothing changed.
+TEST(Progressive, ANetworkThatSaysNothingChangesNothing) {
+  const NoisyFlat frame = makeNoisyFlat(33, 21, 1, 0.1f);
+  const Estimator estimators[] = {byProbes(boxDenoiser()), byProbes(biased(0.2f))};
+  reference::PlainWeights weights = reference::randomMix(4);
+  for (const char* name : {"weight.weight", "weight.bias", "share.weight", "share.bias"})
+    for (float& v : weights.tensors.at(name).values) v = 0;
+  ProgressiveParams params;
+  params.net = std::make_shared<nn::MixNet>(nn::readWeights(reference::safetensors(weights), "still"));
+  for (const size_t count : {1U, 2U}) {
+    const std::span some(estimators, count);
+    const Image still = denoiseProgressively(frame.noisy, some, params), rule = denoiseProgressively(frame.noisy, some);
+    for (const Plane& plane : rule.planes)
+      for (size_t i = 0; i < plane.values.size(); ++i)
+        ASSERT_EQ(still.get(plane.name).values[i], plane.values[i]) << plane.name;
+    params.net = randomNet(4);
+    const Image changed = denoiseProgressively(frame.noisy, some, params);
+    EXPECT_FALSE(std::ranges::equal(changed.get("R").values, rule.get("R").values));
+    params.net = std::make_shared<nn::MixNet>(nn::readWeights(reference::safetensors(weights), "still"));
+  }
+}
+
+Candidate flatCandidate(const Box& window, float value, float error) {
+  Candidate candidate{{window, window, {}, {}}, {}, {}, {}};
+  for (size_t c = 0; c < 3; ++c) {
+    candidate.denoised.add(kRgbNames[c], value);
+    candidate.map.error[c] = Buffer<float>(window.area(), error);
+    candidate.map.variance[c] = Buffer<float>(window.area(), 1e6f);  // a render that does not count
+    candidate.map.covariance[c] = Buffer<float>(window.area(), 0.0f);
+    candidate.spread[c] = Buffer<float>(window.area(), error);
+  }
+  candidate.k = Buffer<float>(window.area(), 0.0f);
+  return candidate;
+}
+
+TEST(Progressive, CandidatesWeighByTheirErrorsInAnyOrder) {
+  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.5f);
+  const Noise noise = noiseOf(frame.noisy);
+  const Box& window = frame.noisy.dataWindow;
+  std::vector<Candidate> some;
+  some.push_back(flatCandidate(window, 0.4f, 0.01f));
+  some.push_back(flatCandidate(window, 0.5f, 0.02f));
+  some.push_back(flatCandidate(window, 0.6f, 0.04f));
+  const Image one = mixCandidates(frame.noisy, noise, some);
+  std::swap(some[0], some[2]);
+  const Image other = mixCandidates(frame.noisy, noise, some);
+  const double mean = (0.4 + 0.5 / 4 + 0.6 / 16) / (1 + 1.0 / 4 + 1.0 / 16);
+  const Buffer<float> k = gate(frame.noisy, noise, [&] {
+    Image image{window, window, {}, {}};
+    for (const char* name : kRgbNames) image.add(name, float(mean));
+    return image;
+  }());
+  for (size_t i = 0; i < window.area(); ++i) {
+    ASSERT_NEAR(one.get("G").values[i], other.get("G").values[i], 1e-5);
+    const double x = double(frame.noisy.get("G").values[i]),
+                 doubt = double(noise.samples[i] + 11) / double(noise.samples[i] - 1);
+    const double share = noise.samples[i] > 1 ? 1 - double(k[i]) / doubt : 1 - double(k[i]);
+    ASSERT_NEAR(one.get("G").values[i], x + share * (mean - x), 2e-4) << i;
+    // The mean error less the candidates' spread about their mean, which here is beyond what independent errors leave.
+    const double error = (0.01 + 0.02 / 4 + 0.04 / 16) / (21.0 / 16),
+                 square = (0.16 + 0.25 / 4 + 0.36 / 16) / (21.0 / 16);
+    if (k[i] == 0) ASSERT_NEAR(one.get("error.G").values[i], error - (square - mean * mean), 1e-4);
+  }
+}
+
+TEST(Progressive, ACandidateThatIsNotFiniteDoesNotCount) {
+  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.1f);
+  const Noise noise = noiseOf(frame.noisy);
+  std::vector<Candidate> some;
+  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
+  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
+  some[1].denoised.find("G")->values.fill(std::numeric_limits<float>::infinity());
+  const Image two = mixCandidates(frame.noisy, noise, some);
+  some.pop_back();
+  const Image one = mixCandidates(frame.noisy, noise, some);
+  for (const char* name : {"R", "G", "B"})
+    for (size_t i = 0; i < 96; ++i) ASSERT_NEAR(two.get(name).values[i], one.get(name).values[i], 1e-5);
 }
 
 TEST(Progressive, ConvergedPixelsAreTheRenderItself) {

@@ -25,10 +25,12 @@ import curve
 import evaluate
 import export
 import golden
+import mix_export
 import train
 from frames import find
+from mix_model import Mix
 from model import COMPONENTS, Compositional
-from weights import load_model, read_tensors
+from weights import load_model, read_tensors, write_tensors
 
 STEPS = 200
 FALL = 0.75  # of the loss, from the first quarter of the steps to the last
@@ -98,6 +100,20 @@ def check_weights(folder):
     expect("coffee" in (folder / "tiny.md").read_text(), "card: expected the held-out frames")
 
 
+def check_mix(folder):
+    """The mixing network with weights by chance: that what is written is what runs, for C++ to be compared with."""
+    torch.manual_seed(5)
+    model = Mix()
+    for layer in (model.weight, model.share):
+        torch.nn.init.normal_(layer.weight)
+    mix_export.save(folder / "mix.safetensors", model, {"name": "random"})
+    loaded = mix_export.load(folder / "mix.safetensors")
+    expect(same(dict(loaded.state_dict()), dict(model.state_dict())), "mix: expected the weights that were written")
+    tensors = mix_export.golden(loaded)
+    expect(tensors["weight"].shape == (3, 28, 44), f"mix: expected logits of 3 candidates, found {tensors['weight'].shape}")
+    write_tensors(folder / "mix_golden.safetensors", tensors)
+
+
 def check_golden(folder):
     golden.main([str(folder / "tiny.safetensors"), str(folder / "golden.safetensors")])
     found, _ = read_tensors(folder / "golden.safetensors")
@@ -115,6 +131,7 @@ def main():
     check_resuming(folder, folder / "frames")
     check_weights(folder)
     check_golden(folder)
+    check_mix(folder)
     curve.main([str(folder / "straight/log.csv"), str(folder / "curve.svg")])
     evaluate.main([str(folder / "tiny.safetensors"), str(folder / "frames"), "--out", str(folder / "pictures")])
 
