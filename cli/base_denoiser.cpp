@@ -50,6 +50,8 @@ BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_
           .addCounts =
               [counts](std::map<std::string, uint64_t>& sums) {
                 sums["network pixels"] += counts->denoised.exchange(0);
+                sums["network pixels in 2 components"] += counts->inTwo.exchange(0);
+                sums["network pixels in 4 components"] += counts->inFour.exchange(0);
                 sums["network pixels skipped"] += counts->skipped.exchange(0);
               }};
 }

@@ -114,7 +114,7 @@ int depthOf(int components) {
 
 }  // namespace
 
-CompositionalNet::CompositionalNet(const WeightFile& file, Precision precision) {
+CompositionalNet::CompositionalNet(const WeightFile& file, Precision precision) : gains_(file) {
   expectMetadata(file, "format", "fathom-compositional");
   expectMetadata(file, "version", "1");
   expectMetadata(file, "inputs", std::to_string(kInputPlanes));
@@ -141,6 +141,25 @@ double CompositionalNet::flopPerPixel(int components) const {
          components * denoise_->graph().flopPerPixel();
 }
 
+// From the last step to the first, each needs more around the window.
+CompositionalNet::Windows CompositionalNet::windowsFor(const Window& window, int height, int width, int depth) const {
+  Windows windows{};
+  windows.level[size_t(depth)] = grown(window, denoiseHalo_, height, width);
+  for (int i = depth; i > 0; --i)
+    windows.level[size_t(i) - 1] = grown(windows.level[size_t(i)], decomposeHalo_, height, width);
+  windows.encoder = grown(windows.level[0], encoderHalo_, height, width);
+  return windows;
+}
+
+double CompositionalNet::flop(const Window& window, int height, int width, int components) const {
+  const int depth = depthOf(components);
+  const Windows windows = windowsFor(window, height, width, depth);
+  double sum = encoder_->graph().flopPerPixel() * double(area(windows.encoder));
+  for (int i = 0; i < depth; ++i)
+    sum += (1 << i) * decompose_->graph().flopPerPixel() * double(area(windows.level[size_t(i)]));
+  return sum + components * denoise_->graph().flopPerPixel() * double(area(windows.level[size_t(depth)]));
+}
+
 int CompositionalNet::halo(int components) const {
   return encoderHalo_ + depthOf(components) * decomposeHalo_ + denoiseHalo_;
 }
@@ -165,10 +184,9 @@ class CompositionalNet::Run {
       const Planes& out, Workspace& workspace, const std::stop_token& stop)
       : net_(net), frame_(frame), out_(out), work_(workspace), stop_(stop), depth_(depthOf(components)) {
     window_ = window;
-    // From the last step to the first, each needs more around the window.
-    windows_[size_t(depth_)] = grown(window, net.denoiseHalo_, frame.height, frame.width);
-    for (int i = depth_; i > 0; --i)
-      windows_[size_t(i) - 1] = grown(windows_[size_t(i)], net.decomposeHalo_, frame.height, frame.width);
+    const Windows windows = net.windowsFor(window, frame.height, frame.width, depth_);
+    windows_ = windows.level;
+    encoded_ = windows.encoder;
   }
 
   void run() {
@@ -204,7 +222,7 @@ class CompositionalNet::Run {
   }
 
   void encode() {
-    const Window from = grown(windows_[0], net_.encoderHalo_, frame_.height, frame_.width);
+    const Window& from = encoded_;
     const ElementSizes sizes = net_.encoder_->sizes();
     const size_t bytes = bytesOf(net_.encoder_->graph().info(net_.planes_), sizes, from.height, from.width);
     packPlanes(frame_.planes.at(from.x, from.y), from.height, from.width, sizes.block, net_.element(),
@@ -303,7 +321,7 @@ class CompositionalNet::Run {
   Workspace& work_;
   const std::stop_token& stop_;
   int depth_;
-  Window window_;
+  Window window_, encoded_;
   std::array<Window, 3> windows_;  // where each level's colours and features are known
 };
 

@@ -131,8 +131,7 @@ Table costs() {
     std::vector<double> memory;
     for (const int k : kComponents) {
       cases.emplace_back([&, k] {
-        denoiseTiles(
-            net, frame.input, k, [k](const nn::Window&) { return k; }, frame.result);
+        denoiseTiles(net, frame.input, planTiles(net, kFrame, kFrame, {.least = k, .most = k}), frame.result);
       });
       memory.push_back(double(peakGrowth(cases.back())));
     }
