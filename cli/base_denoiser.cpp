@@ -119,6 +119,11 @@ BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan,
   return base;
 }
 
+double networkWork(const BaseOptions& options) {
+  constexpr double kSmall = 72e3;  // per pixel, K = 1, width 16
+  return modelOf(options, deep::Quality::Balanced).net->flopPerPixel(1) / kSmall;
+}
+
 bool hasModel(const BaseOptions& options) {
   return !options.model.empty() || !defaultModel(false).empty();
 }

@@ -13,6 +13,7 @@
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
 #include "cli/frame_source.h"
+#include "cli/memory_limit.h"
 #include "cli/method_choice.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
@@ -24,6 +25,11 @@
 namespace fathom::cli {
 
 namespace {
+
+// What a library or network may work in.
+size_t scratchOf(size_t memory) {
+  return memory / 2;
+}
 
 // The mix has a gate of its own.
 deep::DenoisePlan planOf(const ProgressiveRequest& request, const flat::Image& noisy) {
@@ -49,7 +55,7 @@ std::optional<BaseDenoiser> commonBase(const ProgressiveRequest& request, const 
   if (options.name == kOwnBase) return {};
   deep::DenoisePlan plan;
   plan.params.quality = request.quality;
-  return makeBase(options, plan, request.memory / 2);
+  return makeBase(options, plan, scratchOf(request.memory));
 }
 
 // All that decides what comes out, beside the contents of the inputs.
@@ -110,6 +116,23 @@ flat::Image outputOf(flat::Image noisy, flat::Image mixed, bool errors) {
   return noisy;
 }
 
+// Two of the render, one of them moved along its noise; its noise, the denoised, the estimates and the mix.
+size_t imageBytes(const flat::Image& noisy) {
+  constexpr size_t kPixel = 40 * sizeof(float);
+  return noisy.dataWindow.area() * (2 * noisy.planes.size() * sizeof(float) + kPixel);
+}
+
+void expectMemory(const std::string& file, const flat::Image& noisy, const std::optional<BaseDenoiser>& base,
+                  size_t memory) {
+  if (!base || !base->bytes) return;
+  const auto bytes = [&](size_t limit) {
+    return imageBytes(noisy) + base->bytes(noisy.dataWindow.area(), scratchOf(limit));
+  };
+  if (bytes(memory) > workingBytes(memory))
+    fail("{}: expected at least {} MB of memory for it and its denoiser, found a limit of {} MB", file,
+         memoryThatSuffices(memory, bytes) / 1'000'000 + 1, memory / 1'000'000);
+}
+
 class ProgressiveRun {
  public:
   // `passes`: all that there are, of which the first that can be read decides what is left open.
@@ -156,7 +179,7 @@ class ProgressiveRun {
       }
       const flat::Image middle = flat::crop(noisy, middleOf(noisy.dataWindow));
       const MethodChoice choice =
-          chooseMethod(request_.base, middle, planOf(request_, noisy), {.scratch = request_.memory / 2});
+          chooseMethod(request_.base, middle, planOf(request_, noisy), {.scratch = scratchOf(request_.memory)});
       display_.tell(fmt::format("{}: denoised by {}, which {}", inputs.main, choice.name, choice.why));
       return choice.name;
     }
@@ -179,6 +202,7 @@ class ProgressiveRun {
       return;
     }
     flat::Image noisy = read(inputs);
+    expectMemory(inputs.main, noisy, base_, request_.memory);
     const flat::Noise noise = flat::noiseOf(noisy);
     const Progress progress{[&](double done) { display_.at(done); }, stop_};
     flat::Image mixed = mixOf(request_, base_, noisy, noise, progress);

@@ -49,7 +49,8 @@ Buffer<uint8_t> settledPixels(const Image& image) {
 }
 
 bool anyUnsettled(const Buffer<uint8_t>& settled, const Box& window, const nn::Window& block) {
-  const int x1 = std::min(block.x + block.width, window.width()), y1 = std::min(block.y + block.height, window.height());
+  const int x1 = std::min(block.x + block.width, window.width()),
+            y1 = std::min(block.y + block.height, window.height());
   for (int y = block.y; y < y1; ++y) {
     const uint8_t* row = settled.data() + size_t(y) * size_t(window.width());
     if (std::any_of(row + block.x, row + x1, [](uint8_t s) { return s == 0; })) return true;

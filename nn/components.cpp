@@ -77,8 +77,7 @@ BlockStatistics coefficientsOf(const WeightFile& file, const std::string& key) {
            printable(text.substr(0, 60)));
     at = next;
   }
-  if (at != end)
-    fail("{}, metadata {}: expected {} numbers, found more", file.name, key, kBlockStatistics);
+  if (at != end) fail("{}, metadata {}: expected {} numbers, found more", file.name, key, kBlockStatistics);
   return result;
 }
 
