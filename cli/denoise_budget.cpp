@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "flat/sure.h"
+#include "nn/module.h"
 
 namespace fathom::cli {
 

@@ -89,7 +89,7 @@ class Table:
         x, w = self.statistics[of], self.weight[of]
         scale = np.sqrt((x**2).mean(0)) + 1e-9
         x = x / scale
-        normal = (x * w[:, None]).T @ x + RIDGE * w.sum() * np.eye(x.shape[1])
+        normal = (x * w[:, None]).T @ x + (RIDGE * w.sum() + 1e-12) * np.eye(x.shape[1])
         return (np.linalg.solve(normal, (x * w[:, None]).T @ self.gains[of]) / scale[:, None]).T
 
     def left(self, of, choice):
@@ -134,7 +134,8 @@ def across_scenes(table, learned):
 
 
 def report(table, learned, predicted, costs, thresholds):
-    print("| frames | K = 2 | K = 4 | best of each block | at 2 % a pass |" + "".join(f" rule {t} | cost |" for t in thresholds))
+    rules = "".join(f" rule at {t} | cost |" for t in thresholds)
+    print("| frames | K = 2 | K = 4 | best of each block | best at 0.02 a pass |" + rules)
     print("|---|---|---|---|---|" + "---|---|" * len(thresholds))
     rows = [("learned from", learned), ("held out", ~learned)]
     rows += [(name, ~learned & (table.frame == name)) for name in np.unique(table.frame[~learned])]
@@ -179,6 +180,9 @@ def main(arguments=None):
         table = Table(scene, frame, numbers)
     costs = np.array([gigaflops_per_megapixel(model.width, k) for k in COMPONENTS])
     learned = np.array([not frames.held_out(scene) for scene in table.scene])
+    if not learned.any():
+        print("no frames to learn from: one component everywhere")
+        return
     coefficients, predicted = across_scenes(table, learned)
     report(table, learned, predicted, costs, (0, 0.005, 0.01, THRESHOLD))
     if not options.dry:
