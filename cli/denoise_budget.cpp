@@ -7,6 +7,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "cli/memory_limit.h"
 #include "flat/sure.h"
 #include "nn/module.h"
 
@@ -53,17 +54,27 @@ Workload workloadOf(const SequencePlan& plan) {
           plan.denoise.inputs.components, plan.errors ? 1 + flat::SureParams().probes : 1, runsOf(plan)};
 }
 
-// What a budget may choose from: without the network where it may be any base, and is none that can be had.
+// Whether whole frames leave the network's memory; our own filter takes bands.
+bool networkFits(const DenoiseRequest& request, const SequencePlan& plan) {
+  BaseOptions named = request.base;
+  named.name = kNeuralBase;
+  const size_t scratch = decodedLimit(request.memory);
+  return makeBase(named, plan.denoise, scratch).bytes(plan.pixels, scratch) <= workingBytes(request.memory) / 2;
+}
+
+// What a budget may choose from: without the network where it may be any base, and this one cannot be had or needs too much
+// memory.
 std::vector<SettingCost> openCosts(const DenoiseRequest& request, const SequencePlan& plan, Workload& workload) {
   std::vector<std::string> ways = openWays(request, plan);
   if (const auto network = std::ranges::find(ways, kNeuralBase); network != ways.end()) {
+    workload.bfloat16 = nn::machineHasBfloat16();
     try {
       workload.networkWork = networkWork(request.base);
+      if (ways.size() > 1 && !networkFits(request, plan)) ways.erase(network);
     } catch (const Error&) {
       if (ways.size() == 1) throw;
       ways.erase(network);
     }
-    workload.bfloat16 = nn::machineHasBfloat16();
   }
   std::vector<SettingCost> costs = costsOf(plan.deep, ways);
   std::erase_if(costs, [&](const SettingCost& cost) { return !allows(request, plan, cost.setting); });

@@ -95,7 +95,8 @@ class CompositionalNet {
   DecomposeGraph decomposeValues_;  // their graphs have moved into the modules
   DenoiseGraph denoiseValues_;
   std::unique_ptr<const Module> encoder_, decompose_, denoise_;
-  int encoderHalo_ = 0, decomposeHalo_ = 0, denoiseHalo_ = 0;
+  // Around a window, by how often a colour is still split: of the level's features and colour, and of the planes.
+  std::array<int, 3> levelHalo_{}, encoderHalo_{};
 };
 
 }  // namespace fathom::nn

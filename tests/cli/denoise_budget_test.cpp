@@ -177,6 +177,9 @@ TEST(DenoiseBudget, TheNetworkIsChosenFromLikeTheOthers) {
   Planned planned(false);
   planned.request.timeBudget = 1e-6;
   EXPECT_EQ(planned.choice(), "--quality fast --method neural --components 1") << "the quickest";
+  planned.request.memory = 100'000'000;
+  EXPECT_EQ(planned.choice(), "--quality fast --method nlm") << "which needs no whole frames";
+  planned.request.memory = size_t(8) << 30;
   planned.request.base.model = "/nowhere.safetensors";
   EXPECT_EQ(planned.choice(), "--quality fast --method nlm") << "no model that could be read";
   planned.request.anyBase = false;
@@ -204,7 +207,7 @@ TEST(DenoiseBudget, EstimatedErrorsDecideAmongTheBasesThatFit) {
                                planned.request, planned.plan, {}, [] { return 1.0; }, errorOf)
                                .setting);
   };
-  EXPECT_EQ(choice(1000, "neural").substr(0, 40), "--quality balanced --method neural --com");
+  EXPECT_EQ(choice(1000, "neural"), "--quality fast --method neural --components 4") << "of equals the quicker";
   EXPECT_EQ(choice(1000, "nlm"), "--quality best --method nlm");
   EXPECT_EQ(asked, (std::set<std::string>{"neural", "nlm"}));
   EXPECT_THAT(choice(0.8, "nlm"), HasSubstr("--method neural")) << "the other takes longer";

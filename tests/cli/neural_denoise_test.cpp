@@ -188,10 +188,10 @@ TEST_F(NeuralDenoise, ItsMemoryCounts) {
 TEST_F(NeuralDenoise, HasItsPlaceInATimeBudget) {
   const Ran outcome = run("in.exr -o out.exr --method neural --time-budget 1000");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("1000 s a frame allow --quality balanced --method neural --components 4"));
-  EXPECT_THAT(run("in.exr -o out.exr --quality balanced --method neural --components 4").out, HasSubstr("done before"));
+  EXPECT_THAT(outcome.err, HasSubstr("1000 s a frame allow --quality fast --method neural --components 4"));
+  EXPECT_THAT(run("in.exr -o out.exr --quality fast --method neural --components 4").out, HasSubstr("done before"));
   EXPECT_THAT(run("in.exr -o two.exr --method neural --components 2 --time-budget 1000").err,
-              HasSubstr("allow --quality balanced --method neural --components 2"));
+              HasSubstr("allow --quality fast --method neural --components 2"));
   const Ran automatic = run("in.exr -o auto.exr --method auto --time-budget 1000");
   ASSERT_EQ(automatic.status, 0) << automatic.err;
   EXPECT_THAT(run("in.exr -o auto.exr --method auto --time-budget 1000").out, HasSubstr("done before"));

@@ -4,80 +4,24 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <ctime>
-#include <filesystem>
-
 #include "base/error.h"
 #include "nn/tiles.h"
-#include "tests/reference/compositional.h"
+#include "tests/reference/random_planes.h"
 
 namespace fathom::nn {
 namespace {
 
 using reference::CompositionalTwin;
+using reference::fileOf;
+using reference::Frame;
+using reference::largest;
+using reference::largestDifference;
 using reference::PlainWeights;
 using reference::randomCompositional;
-using reference::randomVolume;
+using reference::small;
+using reference::tiled;
 using reference::Volume;
-
-WeightFile fileOf(const PlainWeights& weights) {
-  return readWeights(reference::safetensors(weights), "random");
-}
-
-// Random planes and colours, and what of them a network takes.
-struct Frame {
-  Volume planes, colour;
-  std::vector<float> planeValues, colourValues;
-
-  Frame(int height, int width, uint32_t seed)
-      : planes(randomVolume(kInputPlanes, height, width, seed, -1, 1)),
-        colour(randomVolume(3, height, width, seed + 1, 0, 3)),
-        planeValues(floatsOf(planes)),
-        colourValues(floatsOf(colour)) {}
-
-  CompositionalInput input() const {
-    return {denseRows(planeValues.data(), kInputPlanes, colour.height, colour.width),
-            denseRows(colourValues.data(), 3, colour.height, colour.width), colour.height, colour.width};
-  }
-  size_t values() const { return colourValues.size(); }
-};
-
-std::vector<float> whole(const CompositionalNet& net, const Frame& frame, int components) {
-  std::vector<float> result(frame.values(), -1.0f);
-  CompositionalNet::Workspace workspace;
-  const CompositionalInput input = frame.input();
-  net.denoise(input, {0, 0, input.width, input.height}, components,
-              denseRows(result.data(), 3, input.height, input.width), workspace);
-  return result;
-}
-
-std::vector<float> tiled(const CompositionalNet& net, const Frame& frame, const TileParams& params,
-                         const std::function<BlockWorth(const Window&)>& worth = {}, const Progress& progress = {}) {
-  std::vector<float> result(frame.values(), -1.0f);
-  const CompositionalInput input = frame.input();
-  const std::vector<Tile> tiles = planTiles(net, input.height, input.width, params, worth);
-  denoiseTiles(net, input, tiles, denseRows(result.data(), 3, input.height, input.width), params.memory, progress);
-  return result;
-}
-
-// In the smallest tiles.
-TileParams small(int components) {
-  return {.memory = 1, .least = components, .most = components};
-}
-
-template <class T>
-double largest(const std::vector<T>& values) {
-  double most = 0;
-  for (const T v : values) most = std::max(most, std::fabs(double(v)));
-  return most;
-}
-
-template <class A, class B>
-double largestDifference(const std::vector<A>& a, const std::vector<B>& b) {
-  double most = 0;
-  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(double(a[i]) - double(b[i])));
-  return most;
-}
+using reference::whole;
 
 TEST(CompositionalNet, EqualsItsTwin) {
   for (const int width : {16, 32}) {
@@ -116,95 +60,6 @@ TEST(CompositionalNet, KeepsAColourThatIsTheSameEverywhere) {
   Frame frame(16, 16, 5);
   std::fill(frame.colourValues.begin(), frame.colourValues.end(), 0.7f);
   for (const float v : whole(net, frame, 1)) ASSERT_NEAR(v, 0.7f, 1e-5f);
-}
-
-// Weights with which every 3x3 convolution moves what it sees by a pixel and hands it on undiminished, so that what is as
-// far away as can be counts as much as what is near.
-PlainWeights passing(bool left) {
-  PlainWeights weights = randomCompositional(16, 2);
-  for (auto& [name, tensor] : weights.tensors) {
-    if (!name.ends_with(".weight") || tensor.shape[2] == 1) continue;
-    const int side = int(tensor.shape[3]);
-    for (size_t i = 0; i < tensor.values.size(); ++i) {
-      const int x = int(i) % side, y = int(i) / side % side;
-      const bool kept = side == 2 || (y == 1 && x == (left ? 2 : 0));
-      tensor.values[i] = kept ? 1.0f / float(tensor.shape[1]) : 0.0f;
-    }
-  }
-  return weights;
-}
-
-// The pixels whose colour changes with one pixel of the planes.
-std::vector<bool> moved(const CompositionalNet& net, int height, int width, int components, int at) {
-  Frame frame(height, width, 3);
-  std::ranges::fill(frame.planeValues, 0.0f);
-  const std::vector<float> before = whole(net, frame, components);
-  for (int p = 0; p < kInputPlanes; ++p) frame.planeValues[size_t((p * height + height / 2) * width + at)] = 500;
-  const std::vector<float> after = whole(net, frame, components);
-  std::vector<bool> result(static_cast<size_t>(width));
-  for (size_t i = 0; i < after.size(); ++i)
-    if (before[i] != after[i]) result[i % size_t(width)] = true;
-  return result;
-}
-
-// No pixel beyond the halo decides, and one less than kAlignment within it does: a smaller halo would be wrong, a larger one
-// waste.
-TEST(CompositionalNet, HaloIsWhatTheOutputDependsOn) {
-  constexpr int kHeight = 8, kWidth = 320, kAt = 160, kTile = CompositionalNet::kAlignment;
-  for (const int components : {1, 2, 4}) {
-    int reached = 0, halo = 0;
-    for (const bool left : {false, true}) {
-      const CompositionalNet net(fileOf(passing(left)));
-      halo = net.halo(components);
-      for (int at = kAt; at < kAt + kTile; ++at) {
-        const std::vector<bool> changed = moved(net, kHeight, kWidth, components, at);
-        for (int x = 0; x < kWidth; ++x) {
-          const int tile = x - x % kTile;  // how far away from its tile the pixel lies
-          if (changed[size_t(x)]) reached = std::max({reached, tile - at, at - (tile + kTile - 1)});
-        }
-      }
-    }
-    EXPECT_LE(reached, halo) << "K = " << components;
-    EXPECT_GT(reached, halo - kTile) << "K = " << components;
-    EXPECT_EQ(halo % kTile, 0);
-  }
-}
-
-// Tiles of a frame whose far pixels count: with a halo that is too small by one step they are not those of the whole frame.
-TEST(Tiles, HaveAllThatDecidesThem) {
-  for (const bool left : {false, true}) {
-    const CompositionalNet net(fileOf(passing(left)));
-    Frame frame(64, 320, 3);
-    for (float& v : frame.planeValues) v = v > 0.9f ? 500.0f : 0.0f;
-    for (const int components : {1, 2, 4}) {
-      const std::vector<float> expected = whole(net, frame, components);
-      EXPECT_LT(largestDifference(tiled(net, frame, small(components)), expected), 1e-5 * largest(expected))
-          << "K = " << components;
-    }
-  }
-}
-
-int threadsOfProcess() {
-  return int(std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}));
-}
-
-double cpuSeconds(clockid_t clock) {
-  timespec time{};
-  clock_gettime(clock, &time);
-  return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
-}
-
-// A tile is one thread's work, whatever OpenMP may take: tiles are what runs beside one another.
-TEST(CompositionalNet, WorksInTheThreadThatCallsIt) {
-  const CompositionalNet net(fileOf(randomCompositional(16, 1)));
-  const Frame frame(192, 192, 7);
-  whole(net, frame, 2);
-  const int threads = threadsOfProcess();
-  const double process = cpuSeconds(CLOCK_PROCESS_CPUTIME_ID), own = cpuSeconds(CLOCK_THREAD_CPUTIME_ID);
-  for (int i = 0; i < 3; ++i) whole(net, frame, 2);
-  const double ownTime = cpuSeconds(CLOCK_THREAD_CPUTIME_ID) - own;
-  EXPECT_LT(cpuSeconds(CLOCK_PROCESS_CPUTIME_ID) - process, 1.1 * ownTime + 0.005);
-  EXPECT_EQ(threadsOfProcess(), threads);
 }
 
 TEST(CompositionalNet, CountsItsArithmetic) {
