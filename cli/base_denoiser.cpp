@@ -53,6 +53,8 @@ BaseDenoiser neuralBase(const BaseOptions& options, deep::Quality quality, size_
           .addCounts =
               [counts](std::map<std::string, uint64_t>& sums) {
                 sums["network pixels"] += counts->denoised.exchange(0);
+                sums["network pixels in 2 components"] += counts->inTwo.exchange(0);
+                sums["network pixels in 4 components"] += counts->inFour.exchange(0);
                 sums["network pixels skipped"] += counts->skipped.exchange(0);
               }};
 }
@@ -187,6 +189,11 @@ BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan,
   base.settings += " gated";
   base.gated = true;
   return base;
+}
+
+double networkWork(const BaseOptions& options) {
+  constexpr double kSmall = 72e3;  // per pixel, K = 1, width 16
+  return modelOf(options, deep::Quality::Balanced).net->flopPerPixel(1) / kSmall;
 }
 
 bool hasModel(const BaseOptions& options) {

@@ -64,17 +64,6 @@ size_t wholeFrameBytes(FrameSource& source, const SequencePlan& plan, size_t mem
   return Rows(source, imagesInMemory(errors), guide.madePerPixel).bytes(window.y0, window.y1) + library;
 }
 
-// How much would do, where `memory` does not: libraries take more where they may.
-size_t memoryForWholeFrame(FrameSource& source, const SequencePlan& plan, size_t memory) {
-  constexpr int kMostSteps = 64;  // each takes a quarter of what the last one added
-  for (int step = 0; step < kMostSteps; ++step) {
-    const size_t needed = memoryFor(wholeFrameBytes(source, plan, memory));
-    if (needed <= memory) break;
-    memory = needed;
-  }
-  return memory;
-}
-
 }  // namespace
 
 std::vector<Band> planBands(FrameSource& source, const SequencePlan& plan, int halo, size_t memory) {
@@ -86,7 +75,9 @@ std::vector<Band> planBands(FrameSource& source, const SequencePlan& plan, int h
     fail(
         "{}: expected at least {} MB of memory, for a whole frame, which --method and --error need; found a limit of "
         "{} MB",
-        source.path(), memoryForWholeFrame(source, plan, memory) / 1'000'000 + 1, memory / 1'000'000);
+        source.path(),
+        memoryThatSuffices(memory, [&](size_t limit) { return wholeFrameBytes(source, plan, limit); }) / 1'000'000 + 1,
+        memory / 1'000'000);
   if (!plan.guide || !plan.guide->wholeFrame)
     return cutBands(source, Rows(source, images, guide.madePerPixel), halo, 0, memory);
   // A frame's guide is made while the last one's is still in use.

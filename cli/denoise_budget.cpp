@@ -4,9 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <map>
 
 #include "base/error.h"
+#include "cli/memory_limit.h"
 #include "flat/sure.h"
+#include "nn/module.h"
 
 namespace fathom::cli {
 
@@ -19,8 +22,11 @@ constexpr double kMostClustered = 3;
 std::vector<std::string> openWays(const DenoiseRequest& request, const SequencePlan& plan) {
   if (!plan.deep) {
     if (!request.anyBase) return {request.base.name};
-    const bool library = !plan.denoise.inputs.components && !request.split && findOidn(request.base.oidnLibrary);
-    return library ? std::vector<std::string>{kOwnBase, kOidnBase} : std::vector<std::string>{kOwnBase};
+    std::vector<std::string> ways = {kOwnBase};
+    if (hasModel(request.base)) ways.emplace_back(kNeuralBase);
+    if (!plan.denoise.inputs.components && !request.split && findOidn(request.base.oidnLibrary))
+      ways.emplace_back(kOidnBase);
+    return ways;
   }
   const std::string choice = guideChoice(request);
   if (isGuideFile(choice)) return {kGuideFile};
@@ -33,6 +39,8 @@ std::vector<std::string> openWays(const DenoiseRequest& request, const SequenceP
 // Whether a request lets a setting be; the library is not looked for, so that its absence is an error of its own.
 bool allows(const DenoiseRequest& request, const SequencePlan& plan, const DenoiseSetting& setting) {
   if (setting.deep != plan.deep) return false;
+  if (setting.with == kNeuralBase && request.base.components && request.base.components != setting.components)
+    return false;
   if (!plan.deep) return request.anyBase || setting.with == request.base.name;
   const std::string choice = guideChoice(request);
   if (choice == "auto") return setting.with != kGuideFile;
@@ -44,6 +52,45 @@ Workload workloadOf(const SequencePlan& plan) {
   const double perPixel = double(plan.samples) / pixels;
   return {pixels * 1e-6, plan.cameraSamples ? std::min(perPixel, kMostClustered) : perPixel,
           plan.denoise.inputs.components, plan.errors ? 1 + flat::SureParams().probes : 1, runsOf(plan)};
+}
+
+// Whether whole frames leave the network's memory; our own filter takes bands.
+bool networkFits(const DenoiseRequest& request, const SequencePlan& plan) {
+  BaseOptions named = request.base;
+  named.name = kNeuralBase;
+  const size_t scratch = decodedLimit(request.memory);
+  return makeBase(named, plan.denoise, scratch).bytes(plan.pixels, scratch) <= workingBytes(request.memory) / 2;
+}
+
+// What a budget may choose from: without the network where it may be any base, and this one cannot be had or needs too much
+// memory.
+std::vector<SettingCost> openCosts(const DenoiseRequest& request, const SequencePlan& plan, Workload& workload) {
+  std::vector<std::string> ways = openWays(request, plan);
+  if (const auto network = std::ranges::find(ways, kNeuralBase); network != ways.end()) {
+    workload.bfloat16 = nn::machineHasBfloat16();
+    try {
+      workload.networkWork = networkWork(request.base);
+      if (ways.size() > 1 && !networkFits(request, plan)) ways.erase(network);
+    } catch (const Error&) {
+      if (ways.size() == 1) throw;
+      ways.erase(network);
+    }
+  }
+  std::vector<SettingCost> costs = costsOf(plan.deep, ways);
+  std::erase_if(costs, [&](const SettingCost& cost) { return !allows(request, plan, cost.setting); });
+  return costs;
+}
+
+// Of each way the setting with the least error of those that fit; nothing where none fits.
+std::vector<SettingCost> bestOfWays(const std::vector<SettingCost>& costs, const Workload& workload, double budget,
+                                    double slowness) {
+  std::map<std::string, std::vector<SettingCost>> byWay;
+  for (const SettingCost& cost : costs) byWay[cost.setting.with].push_back(cost);
+  std::vector<SettingCost> result;
+  for (const auto& [way, its] : byWay)
+    if (const BudgetChoice choice = chooseSetting(its, workload, budget, slowness); choice.fits)
+      result.push_back(*std::ranges::find(its, choice.setting, &SettingCost::setting));
+  return result;
 }
 
 // What the outputs say, and the file that says it.
@@ -65,7 +112,7 @@ std::string describeBudget(double seconds) {
 }
 
 BudgetPlan planBudget(const DenoiseRequest& request, const SequencePlan& plan, const std::vector<std::string>& outputs,
-                      const std::function<double()>& slowness) {
+                      const std::function<double()>& slowness, const ErrorOf& errorOf) {
   const std::string budget = describeBudget(*request.timeBudget);
   if (const auto found = findRecord(outputs, request.overwrite ? &budget : nullptr)) {
     const auto setting = parseSetting(found->record.setting);
@@ -78,13 +125,19 @@ BudgetPlan planBudget(const DenoiseRequest& request, const SequencePlan& plan, c
           "chooses anew)",
           found->path, found->record.setting);
   }
-  const std::vector<std::string> ways = openWays(request, plan);
-  if (ways.front() == kNeuralBase)
-    throw CLI::ValidationError(
-        "--time-budget", fmt::format("expected a method or guide whose cost is known ({} or {}), found {}", kOwnBase,
-                                     kOidnBase, kNeuralBase));
-  const BudgetChoice choice =
-      chooseSetting(costsOf(plan.deep, ways), workloadOf(plan), *request.timeBudget, slowness());
+  Workload workload = workloadOf(plan);
+  std::vector<SettingCost> costs = openCosts(request, plan, workload);
+  if (costs.empty())
+    throw CLI::ValidationError("--time-budget", fmt::format("expected a method or guide whose cost is known, found {}",
+                                                            openWays(request, plan).front()));
+  const double slow = slowness();
+  if (errorOf) {
+    if (auto fitting = bestOfWays(costs, workload, *request.timeBudget, slow); fitting.size() > 1) {
+      for (SettingCost& cost : fitting) cost.error = errorOf(cost.setting);
+      costs = std::move(fitting);
+    }
+  }
+  const BudgetChoice choice = chooseSetting(costs, workload, *request.timeBudget, slow);
   const std::string setting = describeSetting(choice.setting);
   if (!choice.fits)
     return {choice.setting, fmt::format("{}: {} a frame are too few; the quickest setting, {}, takes about {:.2g} s",
@@ -95,6 +148,7 @@ BudgetPlan planBudget(const DenoiseRequest& request, const SequencePlan& plan, c
 
 DenoiseRequest withSetting(DenoiseRequest request, const DenoiseSetting& setting) {
   request.params.quality = setting.quality;
+  if (setting.components) request.base.components = setting.components;
   if (!setting.deep)
     request.base.name = setting.with;
   else if (setting.with != kGuideFile)

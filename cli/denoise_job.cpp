@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 
 #include "base/error.h"
 #include "cli/calibration.h"
@@ -16,6 +17,7 @@
 #include "cli/method_choice.h"
 #include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
+#include "flat/noise.h"
 
 namespace fathom::cli {
 
@@ -166,23 +168,33 @@ void setBase(SequencePlan& plan, const DenoiseRequest& request) {
   if (inputs.albedo && !inputs.normal) note("no N.*: the albedo guides alone");
 }
 
-// The base of flat frames, where it is to be chosen.
-void chooseBase(SequencePlan& plan, DenoiseRequest& request, const SourceOptions& options,
+// The middle of the frame that a plan is made from, and what denoisers of that frame are bound to.
+struct Sample {
+  flat::Image middle;
+  MethodLimits limits;
+};
+
+Sample sampleOf(const SequencePlan& plan, const DenoiseRequest& request, const SourceOptions& options,
                 const std::vector<FrameInputs>& candidates) {
   const auto first =
       std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
   FrameSource source(*first, options);
   std::set<std::string> told;
-  const Box middle = middleOf(source.part().dataWindow);
-  flat::Image rows = toFlatFrame(source.read(middle.y0, middle.y1, told), source.flatAttributes());
   const Box& window = source.part().dataWindow;
+  const Box middle = middleOf(window);
+  const flat::Image rows = toFlatFrame(source.read(middle.y0, middle.y1, told), source.flatAttributes());
   const size_t images = imagesInMemory(request.errors) * source.decodedBytes(window.y0, window.y1);
   const size_t memory = workingBytes(request.memory);
-  const MethodLimits limits{.scratch = decodedLimit(request.memory),
-                            .keepComponents = plan.denoise.inputs.components,
-                            .pixels = window.area(),
-                            .room = memory - std::min(memory, images)};
-  const MethodChoice choice = chooseMethod(request.base, flat::crop(rows, middle), plan.denoise, limits);
+  return {flat::crop(rows, middle),
+          {.scratch = decodedLimit(request.memory),
+           .keepComponents = plan.denoise.inputs.components,
+           .pixels = window.area(),
+           .room = memory - std::min(memory, images)}};
+}
+
+// The base of flat frames, where it is to be chosen.
+void chooseBase(SequencePlan& plan, DenoiseRequest& request, const Sample& sample) {
+  const MethodChoice choice = chooseMethod(request.base, sample.middle, plan.denoise, sample.limits);
   request.base.name = choice.name;
   plan.notes.insert(fmt::format("{}: denoised by {}, which {}", plan.first, choice.name, choice.why));
 }
@@ -206,9 +218,19 @@ std::vector<std::string> outputsOf(const DenoiseRequest& request, const Sequence
 }
 
 // Decides what a time budget leaves to be decided: in the plan, and in the request for what comes after it.
-void setBudget(SequencePlan& plan, DenoiseRequest& request, const Sequence& sequence) {
-  const BudgetPlan budget = planBudget(request, plan, outputsOf(request, sequence),
-                                       [] { return calibrationSeconds() / measuredCalibration(); });
+void setBudget(SequencePlan& plan, DenoiseRequest& request, const Sequence& sequence,
+               const std::function<Sample()>& sampled) {
+  std::optional<Sample> sample;
+  if (!plan.deep && request.base.name == kAutoBase) sample = sampled();
+  const auto errorOf = [&](const DenoiseSetting& setting) {
+    const DenoiseRequest asked = withSetting(request, setting);
+    deep::DenoisePlan denoise = plan.denoise;
+    denoise.params = asked.params;
+    return expectedErrorOf(asked.base, sample->middle, denoise, sample->limits);
+  };
+  const BudgetPlan budget = planBudget(
+      request, plan, outputsOf(request, sequence), [] { return calibrationSeconds() / measuredCalibration(); },
+      sample && flat::tellsNoise(sample->middle) ? ErrorOf(errorOf) : ErrorOf());
   plan.record = BudgetRecord{describeBudget(*request.timeBudget), describeSetting(budget.setting)};
   plan.notes.insert(budget.note);
   request = withSetting(std::move(request), budget.setting);
@@ -227,8 +249,9 @@ SequencePlan makePlan(DenoiseRequest request, const Sequence& sequence, const So
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
   if (request.split && !plan.denoise.inputs.components)
     fail("{}: expected diffuse.* and specular.* for --split, found neither", request.input);
-  if (request.timeBudget) setBudget(plan, request, sequence);
-  if (!plan.deep && request.base.name == kAutoBase) chooseBase(plan, request, source, candidates);
+  const auto sampled = [&] { return sampleOf(plan, request, source, candidates); };
+  if (request.timeBudget) setBudget(plan, request, sequence, sampled);
+  if (!plan.deep && request.base.name == kAutoBase) chooseBase(plan, request, sampled());
   if (plan.deep)
     setGuide(plan, request, source, candidates);
   else if (request.base.name != kOwnBase)

@@ -26,15 +26,17 @@ const char* nameOf(deep::Quality quality) {
 }  // namespace
 
 std::string describeSetting(const DenoiseSetting& setting) {
-  return fmt::format("--quality {} {} {}", nameOf(setting.quality), setting.deep ? "--flat-guide" : "--method",
-                     setting.with);
+  return fmt::format("--quality {} {} {}{}", nameOf(setting.quality), setting.deep ? "--flat-guide" : "--method",
+                     setting.with, setting.components ? fmt::format(" --components {}", setting.components) : "");
 }
 
 std::optional<DenoiseSetting> parseSetting(const std::string& text) {
   for (const deep::Quality quality : {deep::Quality::Fast, deep::Quality::Balanced, deep::Quality::Best})
     for (const bool isDeep : {true, false})
-      for (const char* with : {"none", "nlm", "oidn", kGuideFile})
-        if (const DenoiseSetting setting{quality, isDeep, with}; describeSetting(setting) == text) return setting;
+      for (const char* with : {"none", "nlm", "neural", "oidn", kGuideFile})
+        for (const int components : {0, 1, 2, 4})
+          if (const DenoiseSetting setting{quality, isDeep, with, components}; describeSetting(setting) == text)
+            return setting;
   return {};
 }
 

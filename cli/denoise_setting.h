@@ -14,12 +14,13 @@ constexpr const char* kGuideFile = "FILE";
 struct DenoiseSetting {
   deep::Quality quality = deep::Quality::Balanced;
   bool deep = true;           // for deep frames, else for flat ones
-  std::string with = "none";  // deep: the guide (none, nlm, oidn, FILE); flat: the base (nlm, oidn)
+  std::string with = "none";  // deep: the guide (none, nlm, neural, oidn, FILE); flat: the base (nlm, neural, oidn)
+  int components = 0;         // of the network: 1, 2 or 4; 0: what each tile is worth, or no network
 
   bool operator==(const DenoiseSetting&) const = default;
 };
 
-// The options that ask for it: "--quality balanced --flat-guide nlm", "--quality fast --method oidn".
+// The options that ask for it: "--quality balanced --flat-guide nlm", "--quality fast --method neural --components 1".
 std::string describeSetting(const DenoiseSetting& setting);
 
 // The setting that is described so; nothing for any other text.

@@ -150,7 +150,9 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
     guides.push_back({"oidn with prefiltered guides", "Open Image Denoise", oidnGuide(library, true, scratch)});
     guides.push_back({"oidn", "Open Image Denoise", oidnGuide(library, false, scratch)});
   }
-  if (choice == "auto" && base.name == kAutoBase && hasModel(base))
+  // In the place of Open Image Denoise it has to promise more than our own filter, which needs no whole frames.
+  const bool inItsPlace = guides.empty() && plan.params.quality == deep::Quality::Best;
+  if (choice == "auto" && (base.name == kAutoBase || inItsPlace) && hasModel(base))
     guides.push_back({"the network", "the network", neuralGuide(base, plan, scratch)});
   std::erase_if(guides, [&](const NamedGuide& guide) {
     if (choice != "auto" || fits(guide.plan, source, memory)) return false;
@@ -158,6 +160,7 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
         fmt::format("{}: no guide by {}: whole frames of it take more than the memory", source.path(), guide.who));
     return true;
   });
+  if (inItsPlace && !guides.empty()) guides.insert(guides.begin(), {"nlm", "Fathom's own filter", nlmGuide(plan)});
   if (guides.empty()) return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
   NamedGuide best = guides.size() > 1 ? bestGuide(std::move(guides), plan, source) : std::move(guides.front());
   notes.insert(fmt::format("{}: bins are guided by {}, which promises the least error", source.path(), best.name));

@@ -34,7 +34,7 @@ bool canBeGuided(const deep::DenoiseInputs& inputs);
 // where that promises the smaller error (cli/method_choice, on the middle of the first frame, `source`). `auto` is Open
 // Image Denoise where it is found: bins and pixels take of it what the noisy frame confirms, and gain even where it is
 // worse than our own filter (fur); where the base is to be chosen (kAutoBase), the network may promise less error and take
-// its place. Where neither is there, our own flat filter for Quality::Best alone: it makes the flattened frame as good as
+// its place. Where it is not found, Quality::Best takes the network or our own flat filter, as they promise; the latter it makes the flattened frame as good as
 // any flat one, for two thirds more time. None for Quality::Fast, for published filters and for frames that say nothing of
 // their noise, nor where one that takes whole frames would need more than `memory` bytes for `source`. Adds to `notes` what
 // it chose. Throws Error where the choice cannot be had.

@@ -23,6 +23,18 @@ inline size_t memoryFor(size_t working) {
   return working + std::min(working, kProgramBytes);
 }
 
+// A limit that suffices for work that takes `bytes(limit)`, from a `memory` that may not: libraries take more where they may.
+template <class Bytes>
+size_t memoryThatSuffices(size_t memory, const Bytes& bytes) {
+  constexpr int kMostSteps = 64;  // each takes a quarter of what the last one added
+  for (int step = 0; step < kMostSteps; ++step) {
+    const size_t needed = memoryFor(bytes(memory));
+    if (needed <= memory) break;
+    memory = needed;
+  }
+  return memory;
+}
+
 // Bytes that one of the images may take when it is decoded.
 inline size_t decodedLimit(size_t memory) {
   return workingBytes(memory) / kImagesInMemory;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -33,6 +35,14 @@ double expectedError(const flat::Image& noisy, const flat::Denoiser& denoise, fl
   return sum;
 }
 
+double expectedErrorOf(const BaseOptions& options, const flat::Image& noisy, const deep::DenoisePlan& plan,
+                       const MethodLimits& limits) {
+  const BaseDenoiser base = makeBase(options, plan, limits.scratch);
+  if (base.bytes && base.bytes(limits.pixels, limits.scratch) > limits.room)
+    return std::numeric_limits<double>::infinity();
+  return expectedError(noisy, base.denoise, plan.level);
+}
+
 MethodChoice chooseMethod(const BaseOptions& options, const flat::Image& noisy, const deep::DenoisePlan& plan,
                           const MethodLimits& limits) {
   if (!flat::tellsNoise(noisy)) return {kOwnBase, "needs to know no noise"};
@@ -40,18 +50,14 @@ MethodChoice chooseMethod(const BaseOptions& options, const flat::Image& noisy, 
   if (hasModel(options)) names.emplace_back(kNeuralBase);
   if (!limits.keepComponents && findOidn(options.oidnLibrary)) names.emplace_back(kOidnBase);
   if (names.size() == 1) return {kOwnBase, "is all that there is"};
-  MethodChoice best{{}, "promises the least error"};
-  double least = 0;
+  MethodChoice best{kOwnBase, "promises the least error"};
+  double least = std::numeric_limits<double>::infinity();
   for (const std::string& name : names) {
     BaseOptions named = options;
     named.name = name;
-    const BaseDenoiser base = makeBase(named, plan, limits.scratch);
-    if (base.bytes && base.bytes(limits.pixels, limits.scratch) > limits.room) {
-      best.why = "promises the least error of those that fit the memory";
-      continue;
-    }
-    const double error = expectedError(noisy, base.denoise, plan.level);
-    if (!best.name.empty() && !(error < least)) continue;
+    const double error = expectedErrorOf(named, noisy, plan, limits);
+    if (std::isinf(error)) best.why = "promises the least error of those that fit the memory";
+    if (!(error < least)) continue;
     best.name = name;
     least = error;
   }

@@ -21,17 +21,21 @@ Box middleOf(const Box& window);
 // Error where the picture says nothing of its noise.
 double expectedError(const flat::Image& noisy, const flat::Denoiser& denoise, float level);
 
-struct MethodChoice {
-  std::string name;  // nlm, neural or oidn
-  std::string why;   // for the user
-};
-
 // What the choice is bound to.
 struct MethodLimits {
   size_t scratch = 0;           // see makeBase
   bool keepComponents = false;  // not Open Image Denoise, which drops them
   size_t pixels = 0;            // of a whole frame, for which a denoiser may take `room` bytes
   size_t room = SIZE_MAX;
+};
+
+// The same of a base that is named in `options`, with the quality of `plan`; infinite where it does not fit `limits`.
+double expectedErrorOf(const BaseOptions& options, const flat::Image& noisy, const deep::DenoisePlan& plan,
+                       const MethodLimits& limits);
+
+struct MethodChoice {
+  std::string name;  // nlm, neural or oidn
+  std::string why;   // for the user
 };
 
 // Of our own filter, the network where a model is named or installed, and Open Image Denoise where it is found. Our own

@@ -13,6 +13,7 @@
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
 #include "cli/frame_source.h"
+#include "cli/memory_limit.h"
 #include "cli/method_choice.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
@@ -24,6 +25,11 @@
 namespace fathom::cli {
 
 namespace {
+
+// What a library or network may work in.
+size_t scratchOf(size_t memory) {
+  return memory / 2;
+}
 
 // The mix has a gate of its own.
 deep::DenoisePlan planOf(const ProgressiveRequest& request, const flat::Image& noisy) {
@@ -53,7 +59,7 @@ std::vector<NamedBase> basesOf(const ProgressiveRequest& request, const std::str
     if (name == kOwnBase) continue;
     BaseOptions options = request.base;
     options.name = name;
-    base.common = makeBase(options, plan, request.memory / 2);
+    base.common = makeBase(options, plan, scratchOf(request.memory));
   }
   return bases;
 }
@@ -62,7 +68,7 @@ std::vector<NamedBase> basesOf(const ProgressiveRequest& request, const std::str
 std::string describeSettings(const ProgressiveRequest& request, const std::vector<NamedBase>& bases,
                              const std::string& mix, const SourceOptions& source) {
   std::string text =
-      fmt::format("progressive mix {} quality {} probes {} errors {} features {} halves {}", int(request.quality),
+      fmt::format("progressive mix {} quality {} probes {} errors {} features {} halves {}", mix, int(request.quality),
                   request.probes, request.errors, !request.features.empty(), request.halves.size());
   for (const NamedBase& base : bases) text += " base " + (base.common ? base.common->settings : base.name);
   if (source.map)
@@ -139,6 +145,26 @@ flat::Image candidatesOf(const flat::Image& output, const std::vector<NamedBase>
   return image;
 }
 
+// Two of the render, one of them moved along its noise; its noise and the mix; and of each denoiser its result and what is
+// estimated of it.
+size_t imageBytes(const flat::Image& noisy, size_t denoisers) {
+  constexpr size_t kPixel = 16 * sizeof(float), kCandidate = 24 * sizeof(float);
+  return noisy.dataWindow.area() * (2 * noisy.planes.size() * sizeof(float) + kPixel + denoisers * kCandidate);
+}
+
+void expectMemory(const std::string& file, const flat::Image& noisy, const std::vector<NamedBase>& bases, size_t memory) {
+  const auto bytes = [&](size_t limit) {
+    size_t most = 0;
+    for (const NamedBase& base : bases)
+      if (base.common && base.common->bytes)
+        most = std::max(most, base.common->bytes(noisy.dataWindow.area(), scratchOf(limit)));
+    return imageBytes(noisy, bases.size()) + most;
+  };
+  if (bytes(memory) > workingBytes(memory))
+    fail("{}: expected at least {} MB of memory for it and its denoiser, found a limit of {} MB", file,
+         memoryThatSuffices(memory, bytes) / 1'000'000 + 1, memory / 1'000'000);
+}
+
 class ProgressiveRun {
  public:
   // `passes`: all that there are, of which the first that can be read decides what is left open.
@@ -186,7 +212,7 @@ class ProgressiveRun {
       }
       const flat::Image middle = flat::crop(noisy, middleOf(noisy.dataWindow));
       const MethodChoice choice =
-          chooseMethod(request_.base, middle, planOf(request_, noisy), {.scratch = request_.memory / 2});
+          chooseMethod(request_.base, middle, planOf(request_, noisy), {.scratch = scratchOf(request_.memory)});
       display_.tell(fmt::format("{}: denoised by {}, which {}", inputs.main, choice.name, choice.why));
       return choice.name;
     }
@@ -209,6 +235,7 @@ class ProgressiveRun {
       return;
     }
     flat::Image noisy = read(inputs);
+    expectMemory(inputs.main, noisy, bases_, request_.memory);
     const flat::Noise noise = flat::noiseOf(noisy);
     const Progress progress{[&](double done) { display_.at(done); }, stop_};
     std::vector<flat::Estimator> estimators;

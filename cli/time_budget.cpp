@@ -14,6 +14,9 @@ using deep::Quality;
 // The share of the time of our own filters that is left where the colour is one component (staircase2 at 8 samples).
 constexpr double kOneComponent = 0.75;
 
+// How much longer the network takes in float32 than in bfloat16 (`./run bench nn`).
+constexpr double kFloat32 = 2.1;
+
 // What `./run bench pareto FOLDER 0.25 2` printed as "For cli/time_budget.cpp" for the eight renders of the README, on two
 // quiet cores with AVX-512.
 const std::vector<SettingCost>& table() {
@@ -32,6 +35,14 @@ const std::vector<SettingCost>& table() {
       {{Quality::Best, false, "nlm"}, 3.16, 0, 0, 0.123},
       {{Quality::Fast, false, "oidn"}, 0, 0, 0.798, 0.108},
       {{Quality::Balanced, false, "oidn"}, 0, 0, 9.93, 0.0897},
+      // Of one light: `./run bench nn` on the same machine. Errors: those of `nlm balanced` times what the network's are of
+      // them on the three frames that `small` has not learned from (docs/notes.md).
+      {{Quality::Fast, false, "neural", 1}, 0, 0, 0.3, 0.152},
+      {{Quality::Fast, false, "neural", 2}, 0, 0, 0.75, 0.149},
+      {{Quality::Fast, false, "neural", 4}, 0, 0, 1.55, 0.147},
+      {{Quality::Balanced, false, "neural", 1}, 0, 0, 0.6, 0.152},
+      {{Quality::Balanced, false, "neural", 2}, 0, 0, 1.6, 0.149},
+      {{Quality::Balanced, false, "neural", 4}, 0, 0, 3.45, 0.147},
   };
   return costs;
 }
@@ -59,9 +70,21 @@ std::vector<SettingCost> costsOf(bool deep, std::span<const std::string> with) {
   return result;
 }
 
+namespace {
+
+// The lights of flat frames go through our network one by one.
+double networkSeconds(const SettingCost& cost, const Workload& workload) {
+  if (cost.setting.with != kNeuralBase) return cost.network;
+  const double lights = !cost.setting.deep && workload.components ? 2 : 1;
+  const bool slower = cost.setting.quality == Quality::Fast && !workload.bfloat16;
+  return cost.network * workload.networkWork * lights * (slower ? kFloat32 : 1);
+}
+
+}  // namespace
+
 double expectedSeconds(const SettingCost& cost, const Workload& workload, double slowness) {
   const double filters = cost.perMegapixel + cost.perMillionBins * workload.binsPerPixel;
-  const double perMegapixel = cost.network + filters * (workload.components ? 1 : kOneComponent);
+  const double perMegapixel = networkSeconds(cost, workload) + filters * (workload.components ? 1 : kOneComponent);
   const bool own = !cost.setting.deep && cost.setting.with == kOwnBase;
   return slowness * (own ? workload.flatRuns : workload.runs) * workload.megapixels * perMegapixel;
 }

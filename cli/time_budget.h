@@ -19,13 +19,15 @@ struct Workload {
   bool components = true;   // diffuse and specular are filtered one by one
   int runs = 1;             // of the denoiser: an estimate of its errors takes further ones
   int flatRuns = 1;         // the same of Fathom's own filter on flat frames, which may tell its errors by itself
+  double networkWork = 1;   // the arithmetic of the network that is at hand over that of `small`
+  bool bfloat16 = true;     // it multiplies in bfloat16 for Quality::Fast
 };
 
 // Seconds on the machine of the measurement, frames decoded and with all features.
 struct SettingCost {
   DenoiseSetting setting;
   double perMegapixel = 0, perMillionBins = 0;  // of Fathom's own filters
-  double network = 0;                           // of Open Image Denoise, per megapixel
+  double network = 0;  // of Open Image Denoise or the network `small`, per megapixel, on flat frames of one light
   double error =
       0;  // relMSE over that of the noisy frames: flattened, and of deep ones the geometric mean with per bin
 };

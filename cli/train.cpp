@@ -92,6 +92,8 @@ void runTrain(const TrainCommand& command) {
     write.emplace_back("--data");
     write.push_back(command.data);
   }
+  write.emplace_back("--frames");
+  write.insert(write.end(), command.folders.begin(), command.folders.end());
   if (const int status = run(write)) fail("{}: ended with status {}", write[1], status);
   fmt::print("{}: fathom denoise IN -o OUT --method neural --model {}\n", weights, weights);
 }

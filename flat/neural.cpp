@@ -21,8 +21,14 @@ namespace {
 constexpr size_t kPixelBytes = (nn::kInputPlanes + 3 + 3 + 9) * sizeof(float) + 20;
 constexpr int kLargestTile = 512, kSmallestTile = 64;  // of nn/tiles
 
-int mostComponents(const NeuralParams& params) {
-  return params.components > 0 ? params.components : kAutoComponents;
+// Without coefficients nothing tells what components are worth.
+int mostComponents(const nn::CompositionalNet& net, const NeuralParams& params) {
+  if (params.components > 0) return params.components;
+  return net.gains().known() ? nn::kMostComponents : 1;
+}
+
+nn::TileParams tileParams(const nn::CompositionalNet& net, const NeuralParams& params) {
+  return {.memory = params.memory, .least = std::max(params.components, 1), .most = mostComponents(net, params)};
 }
 
 // 1 where the render stays: it has converged, or there is nothing.
@@ -42,11 +48,12 @@ Buffer<uint8_t> settledPixels(const Image& image) {
   return settled;
 }
 
-bool anyUnsettled(const Buffer<uint8_t>& settled, const Box& window, const nn::Window& tile) {
-  const int x1 = std::min(tile.x + tile.width, window.width()), y1 = std::min(tile.y + tile.height, window.height());
-  for (int y = tile.y; y < y1; ++y) {
+bool anyUnsettled(const Buffer<uint8_t>& settled, const Box& window, const nn::Window& block) {
+  const int x1 = std::min(block.x + block.width, window.width()),
+            y1 = std::min(block.y + block.height, window.height());
+  for (int y = block.y; y < y1; ++y) {
     const uint8_t* row = settled.data() + size_t(y) * size_t(window.width());
-    if (std::any_of(row + tile.x, row + x1, [](uint8_t s) { return s == 0; })) return true;
+    if (std::any_of(row + block.x, row + x1, [](uint8_t s) { return s == 0; })) return true;
   }
   return false;
 }
@@ -63,10 +70,15 @@ class LightRun {
 
   void run(Light light, const Progress& progress, Image& result) {
     planes_.select(light);
+    const nn::CompositionalInput input = planes_.input();
+    const nn::TileParams tiling = tileParams(net_, params_);
+    const std::vector<nn::Tile> tiles =
+        nn::planTiles(net_, input.height, input.width, tiling,
+                      [&](const nn::Window& block) { return worthOf(input, block, tiling.most > tiling.least); });
+    if (counts_) count(tiles);
     Buffer<float> out(3 * size_t(planes_.height()) * size_t(planes_.width()), 0.0f);
-    nn::denoiseTiles(
-        net_, planes_.input(), mostComponents(params_), [&](const nn::Window& tile) { return componentsOf(tile); },
-        nn::denseRows(out.data(), 3, planes_.height(), planes_.width()), {.memory = params_.memory}, progress);
+    nn::denoiseTiles(net_, input, tiles, nn::denseRows(out.data(), 3, planes_.height(), planes_.width()),
+                     params_.memory, progress);
     for (size_t c = 0; c < 3; ++c) {
       const std::string name = prefixOf(light) + kRgbNames[c];
       take(out.data() + c * size_t(planes_.height()) * size_t(planes_.width()), noisy_.get(name).values,
@@ -86,10 +98,23 @@ class LightRun {
   }
 
  private:
-  int componentsOf(const nn::Window& tile) const {
-    const bool worth = anyUnsettled(settled_, noisy_.dataWindow, tile);
-    if (counts_) (worth ? counts_->denoised : counts_->skipped) += uint64_t(tile.width) * uint64_t(tile.height);
-    return worth ? mostComponents(params_) : 0;
+  nn::BlockWorth worthOf(const nn::CompositionalInput& input, const nn::Window& block, bool open) const {
+    nn::BlockWorth worth{.work = anyUnsettled(settled_, noisy_.dataWindow, block)};
+    if (worth.work && open)
+      worth.gain = net_.gains().of(nn::blockStatistics(input.planes.at(block.x, block.y), block.height, block.width));
+    return worth;
+  }
+
+  void count(const std::vector<nn::Tile>& tiles) const {
+    uint64_t done = 0;
+    for (const auto& [window, components] : tiles) {
+      const uint64_t pixels = uint64_t(window.width) * uint64_t(window.height);
+      done += pixels;
+      if (components == 2) counts_->inTwo += pixels;
+      if (components == 4) counts_->inFour += pixels;
+    }
+    counts_->denoised += done;
+    counts_->skipped += uint64_t(planes_.width()) * uint64_t(planes_.height()) - done;
   }
 
   // Out of the network's exposure.
@@ -138,7 +163,7 @@ Denoiser neural(std::shared_ptr<const nn::CompositionalNet> net, const NeuralPar
 }
 
 size_t neuralBytes(const nn::CompositionalNet& net, const NeuralParams& params, size_t pixels) {
-  const int components = mostComponents(params);
+  const int components = mostComponents(net, params);
   const double halo = 2.0 * net.halo(components), perPixel = net.bytesPerPixel(components);
   const double least = perPixel * (kSmallestTile + halo) * (kSmallestTile + halo);
   const double grown = (kLargestTile + halo) / kLargestTile;

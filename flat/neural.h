@@ -14,21 +14,19 @@
 namespace fathom::flat {
 
 struct NeuralParams {
-  int components = 0;  // that each light is split into: 1, 2 or 4; 0: kAutoComponents
+  int components = 0;  // that each light is split into: 1, 2 or 4; 0: what each tile is worth (nn/tile_plan)
   size_t memory = 0;   // bytes that the network may work in, beside its planes; 0: as many as it likes
 };
 
-// What a frame is worth by default: see docs/notes.md.
-inline constexpr int kAutoComponents = 1;
-
-// Pixels of all lights: those that went through the network, and those in tiles without anything to denoise.
+// Pixels of all lights: those that went through the network, of these those with 2 and 4 components, and those in blocks
+// without anything to denoise.
 struct NeuralCounts {
-  std::atomic<uint64_t> denoised = 0, skipped = 0;
+  std::atomic<uint64_t> denoised = 0, inTwo = 0, inFour = 0, skipped = 0;
 };
 
 // R, G and B of the network, and beside them diffuse.* and specular.* where the image has both. Values are finite and not
 // negative; what is not finite in the input counts as 0. Converged pixels (flat/noise) keep the render, and a pixel with A
-// = 0 and no colour stays black; tiles of nothing but these are skipped. A scaled frame is denoised alike, to 1e-4; the same
+// = 0 and no colour stays black; blocks of nothing but these are skipped. A scaled frame is denoised alike, to 1e-4; the same
 // bits for any number of threads. Images may have any of the channels of DATA.md, and R, G and B at least. Adds to
 // `counts` where it is given.
 Image denoiseNeural(const nn::CompositionalNet& net, const NeuralParams& params, const Image& noisy,

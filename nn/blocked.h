@@ -17,6 +17,8 @@ inline size_t bytesOf(Element element) {
 // How many values lie where, in pixels.
 struct Window {
   int x = 0, y = 0, width = 0, height = 0;
+
+  bool operator==(const Window&) const = default;
 };
 
 // Rounds to the nearest, halves to the even one. `from` is finite.

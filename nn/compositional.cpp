@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "nn/blocked.h"
 #include "nn/colour_kernel.h"
+#include "nn/compositional_halo.h"
 
 namespace fathom::nn {
 
@@ -39,46 +40,6 @@ int widthOf(const WeightFile& file) {
     fail("{}, metadata width: expected a multiple of 16 up to {}, found {}", file.name, kMostWidth,
          printable(text.substr(0, 60)));
   return width;
-}
-
-int rounded(int pixels) {
-  constexpr int kStep = CompositionalNet::kAlignment;
-  return (pixels + kStep - 1) / kStep * kStep;
-}
-
-// How far `needed` reaches beyond a tile of kAlignment pixels that begins at 0.
-int haloOf(const Interval& needed) {
-  return rounded(std::max({-needed.begin, needed.end - CompositionalNet::kAlignment, 0}));
-}
-
-constexpr Interval kTile = {0, CompositionalNet::kAlignment};
-
-// The pixels of the smaller image that a bilinear enlargement takes `out` from.
-Interval enlargedFrom(const Interval& out) {
-  const auto below = [](int x) { return (x + 4096) / 2 - 2048; };  // rounds down
-  return {below(out.begin - 1), below(out.end) + 1};
-}
-
-Interval halvedFrom(const Interval& out) {
-  return {2 * out.begin, 2 * out.end};
-}
-
-// r0 = d0 + a0 U(r1 - D(d0)), r1 = d1 + a1 U(d2 - D(d1)): which kernels and colours a tile takes.
-int denoiseHalo(const DenoiseGraph& values) {
-  const Interval r1 = enlargedFrom(kTile), d0 = halvedFrom(r1).with(kTile);
-  const Interval d2 = enlargedFrom(r1), d1 = halvedFrom(d2).with(r1);
-  const Interval c2 = d2.around(kKernelWidth / 2);
-  const Interval c1 = halvedFrom(c2).with(d1.around(kKernelWidth / 2));
-  const Interval c0 = halvedFrom(c1).with(d0.around(kKernelWidth / 2));
-  const auto needed =
-      values.graph.reach({{values.kernel[0].index, d0}, {values.kernel[1].index, d1}, {values.kernel[2].index, d2}});
-  return haloOf(needed[0].with(needed[1]).with(c0));
-}
-
-int decomposeHalo(const DecomposeGraph& values) {
-  const auto needed =
-      values.graph.reach({{values.mask.index, kTile}, {values.first.index, kTile}, {values.second.index, kTile}});
-  return haloOf(needed[0].with(needed[1]));
 }
 
 // A window with `halo` more around it, as far as there is a frame.
@@ -114,7 +75,7 @@ int depthOf(int components) {
 
 }  // namespace
 
-CompositionalNet::CompositionalNet(const WeightFile& file, Precision precision) {
+CompositionalNet::CompositionalNet(const WeightFile& file, Precision precision) : gains_(file) {
   expectMetadata(file, "format", "fathom-compositional");
   expectMetadata(file, "version", "1");
   expectMetadata(file, "inputs", std::to_string(kInputPlanes));
@@ -126,9 +87,9 @@ CompositionalNet::CompositionalNet(const WeightFile& file, Precision precision) 
   weights.finish();
   planes_ = encoder.planes;
   features_ = encoder.features;
-  encoderHalo_ = haloOf(encoder.graph.reach({{features_.index, kTile}})[0]);
-  decomposeHalo_ = decomposeHalo(decomposeValues_);
-  denoiseHalo_ = denoiseHalo(denoiseValues_);
+  const Halos halos = halosOf(encoder, decomposeValues_, denoiseValues_, kAlignment);
+  levelHalo_ = halos.level;
+  encoderHalo_ = halos.encoder;
   const Element element = elementFor(precision);
   encoder_ = std::make_unique<Module>(std::move(encoder.graph), element);
   decompose_ = std::make_unique<Module>(std::move(decomposeValues_.graph), element);
@@ -141,8 +102,25 @@ double CompositionalNet::flopPerPixel(int components) const {
          components * denoise_->graph().flopPerPixel();
 }
 
+CompositionalNet::Windows CompositionalNet::windowsFor(const Window& window, int height, int width, int depth) const {
+  Windows windows{};
+  for (int i = 0; i <= depth; ++i)
+    windows.level[size_t(i)] = grown(window, levelHalo_[size_t(depth - i)], height, width);
+  windows.encoder = grown(window, encoderHalo_[size_t(depth)], height, width);
+  return windows;
+}
+
+double CompositionalNet::flop(const Window& window, int height, int width, int components) const {
+  const int depth = depthOf(components);
+  const Windows windows = windowsFor(window, height, width, depth);
+  double sum = encoder_->graph().flopPerPixel() * double(area(windows.encoder));
+  for (int i = 0; i < depth; ++i)
+    sum += (1 << i) * decompose_->graph().flopPerPixel() * double(area(windows.level[size_t(i)]));
+  return sum + components * denoise_->graph().flopPerPixel() * double(area(windows.level[size_t(depth)]));
+}
+
 int CompositionalNet::halo(int components) const {
-  return encoderHalo_ + depthOf(components) * decomposeHalo_ + denoiseHalo_;
+  return encoderHalo_[size_t(depthOf(components))];
 }
 
 double CompositionalNet::bytesPerPixel(int components) const {
@@ -165,10 +143,9 @@ class CompositionalNet::Run {
       const Planes& out, Workspace& workspace, const std::stop_token& stop)
       : net_(net), frame_(frame), out_(out), work_(workspace), stop_(stop), depth_(depthOf(components)) {
     window_ = window;
-    // From the last step to the first, each needs more around the window.
-    windows_[size_t(depth_)] = grown(window, net.denoiseHalo_, frame.height, frame.width);
-    for (int i = depth_; i > 0; --i)
-      windows_[size_t(i) - 1] = grown(windows_[size_t(i)], net.decomposeHalo_, frame.height, frame.width);
+    const Windows windows = net.windowsFor(window, frame.height, frame.width, depth_);
+    windows_ = windows.level;
+    encoded_ = windows.encoder;
   }
 
   void run() {
@@ -204,7 +181,7 @@ class CompositionalNet::Run {
   }
 
   void encode() {
-    const Window from = grown(windows_[0], net_.encoderHalo_, frame_.height, frame_.width);
+    const Window& from = encoded_;
     const ElementSizes sizes = net_.encoder_->sizes();
     const size_t bytes = bytesOf(net_.encoder_->graph().info(net_.planes_), sizes, from.height, from.width);
     packPlanes(frame_.planes.at(from.x, from.y), from.height, from.width, sizes.block, net_.element(),
@@ -303,7 +280,7 @@ class CompositionalNet::Run {
   Workspace& work_;
   const std::stop_token& stop_;
   int depth_;
-  Window window_;
+  Window window_, encoded_;
   std::array<Window, 3> windows_;  // where each level's colours and features are known
 };
 

@@ -5,10 +5,12 @@
 // again. Layers: nn/compositional_layers.h.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <stop_token>
 #include <string>
 
+#include "nn/components.h"
 #include "nn/compositional_layers.h"
 #include "nn/kernel_filter.h"
 #include "nn/module.h"
@@ -35,10 +37,14 @@ class CompositionalNet {
 
   int width() const { return width_; }
   Element element() const { return encoder_->element(); }
+  // What more components are worth to a block, as the weights' training found.
+  const ComponentGains& gains() const { return gains_; }
 
   // Components are 1, 2 or 4 everywhere.
   // Arithmetic per pixel in the network's layers; what is done for borders comes on top.
   double flopPerPixel(int components) const;
+  // The same for a window of a frame, with what is done for its borders.
+  double flop(const Window& window, int height, int width, int components) const;
   // How far away an input may be that an output depends on, rounded up to kAlignment.
   int halo(int components) const;
   // What denoising holds besides its input and output, per pixel of the window with its halo.
@@ -76,12 +82,21 @@ class CompositionalNet {
  private:
   class Run;
 
+  // What is computed for a window: colours and features of each level, and the encoder's.
+  struct Windows {
+    std::array<Window, 3> level;
+    Window encoder;
+  };
+  Windows windowsFor(const Window& window, int height, int width, int depth) const;
+
   int width_ = 0;
+  ComponentGains gains_;
   Value planes_, features_;
   DecomposeGraph decomposeValues_;  // their graphs have moved into the modules
   DenoiseGraph denoiseValues_;
   std::unique_ptr<const Module> encoder_, decompose_, denoise_;
-  int encoderHalo_ = 0, decomposeHalo_ = 0, denoiseHalo_ = 0;
+  // Around a window, by how often a colour is still split: of the level's features and colour, and of the planes.
+  std::array<int, 3> levelHalo_{}, encoderHalo_{};
 };
 
 }  // namespace fathom::nn

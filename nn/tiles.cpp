@@ -3,42 +3,15 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "base/parallel.h"
 
 namespace fathom::nn {
 
 namespace {
-
-constexpr int kSmallest = 64, kFair = 256, kLargest = 512, kStep = 32;
-constexpr double kTogether = 8;  // tiles that should fit into the memory at once, as long as they stay fair
-
-double bytesOfTile(const CompositionalNet& net, int side, int components) {
-  const double whole = side + 2 * net.halo(components);
-  return net.bytesPerPixel(components) * whole * whole;
-}
-
-int tileSide(const CompositionalNet& net, int components, const TileParams& params) {
-  int side = kLargest;
-  const auto tooLarge = [&](double tiles) {
-    return params.memory && tiles * bytesOfTile(net, side, components) > double(params.memory);
-  };
-  while (side > kFair && tooLarge(kTogether)) side -= kStep;
-  while (side > kSmallest && tooLarge(1)) side -= kStep;
-  return side;
-}
-
-// Parts of about equal length, at most `most`, each but the last a multiple of kStep.
-std::vector<int> cuts(int length, int most) {
-  const int parts = (length + most - 1) / most;
-  const int part = parts ? ((length + parts - 1) / parts + kStep - 1) / kStep * kStep : 0;
-  std::vector<int> result = {0};
-  while (result.back() < length) result.push_back(std::min(result.back() + part, length));
-  return result;
-}
 
 // Workspaces, each used by one tile at a time.
 class Workspaces {
@@ -79,41 +52,31 @@ class Done {
 
 }  // namespace
 
-std::vector<Window> tilesOf(const CompositionalNet& net, int height, int width, int mostComponents,
-                            const TileParams& params) {
-  const int side = tileSide(net, mostComponents, params);
-  const std::vector<int> xs = cuts(width, side), ys = cuts(height, side);
-  std::vector<Window> tiles;
-  for (size_t j = 0; j + 1 < ys.size(); ++j)
-    for (size_t i = 0; i + 1 < xs.size(); ++i) tiles.push_back({xs[i], ys[j], xs[i + 1] - xs[i], ys[j + 1] - ys[j]});
-  return tiles;
-}
-
-void denoiseTiles(const CompositionalNet& net, const CompositionalInput& frame, int mostComponents,
-                  const std::function<int(const Window& tile)>& components, const Planes& out, const TileParams& params,
-                  const Progress& progress) {
-  const std::vector<Window> tiles = tilesOf(net, frame.height, frame.width, mostComponents, params);
-  int threads = tbb::this_task_arena::max_concurrency();
-  if (params.memory) {
-    const double perTile = bytesOfTile(net, tileSide(net, mostComponents, params), mostComponents);
-    threads = std::clamp(int(double(params.memory) / perTile), 1, threads);
+void denoiseTiles(const CompositionalNet& net, const CompositionalInput& frame, std::span<const Tile> tiles,
+                  const Planes& out, size_t memory, const Progress& progress) {
+  double most = 1, all = 0;
+  std::vector<double> work;
+  for (const Tile& tile : tiles) {
+    most = std::max(most, bytesOfTile(net, tile));
+    all += work.emplace_back(net.flop(tile.window, frame.height, frame.width, tile.components));
   }
+  int threads = tbb::this_task_arena::max_concurrency();
+  if (memory) threads = std::clamp(int(std::min(double(memory) / most, 1e6)), 1, threads);
   Workspaces workspaces;
-  Done done(double(frame.height) * frame.width, progress);
+  Done done(all, progress);
   progress.at(0);
   tbb::task_arena arena(threads);
   arena.execute([&] {
     parallelFor(0, int(tiles.size()), [&](int i) {
-      const Window& tile = tiles[size_t(i)];
+      const Tile& tile = tiles[size_t(i)];
       if (progress.stop.stop_requested()) throw Cancelled();
-      if (const int count = components(tile)) {
-        auto workspace = workspaces.take();
-        net.denoise(frame, tile, count, out, *workspace, progress.stop);
-        workspaces.giveBack(std::move(workspace));
-      }
-      done.add(double(tile.width) * tile.height);
+      auto workspace = workspaces.take();
+      net.denoise(frame, tile.window, tile.components, out, *workspace, progress.stop);
+      workspaces.giveBack(std::move(workspace));
+      done.add(work[size_t(i)]);
     });
   });
+  progress.at(1);
 }
 
 }  // namespace fathom::nn

@@ -1,30 +1,18 @@
-// A frame through the network in tiles, many at once.
+// The tiles of a frame through the network, many at once.
 #pragma once
 
 #include <cstddef>
-#include <functional>
-#include <vector>
+#include <span>
 
 #include "base/progress.h"
-#include "nn/compositional.h"
+#include "nn/tile_plan.h"
 
 namespace fathom::nn {
 
-struct TileParams {
-  // What may be held besides the frame and the result; 0: no limit. Tiles have 512 pixels a side; 256 at least where eight
-  // would not fit at once; and 64 at least where one would not. Where not every thread's tile fits, fewer threads work.
-  size_t memory = 0;
-};
-
-// The tiles of a frame, in rows. They depend on the frame's size, the network and the memory limit, not on the threads.
-std::vector<Window> tilesOf(const CompositionalNet& net, int height, int width, int mostComponents,
-                            const TileParams& params);
-
-// Denoises a frame whose sides are multiples of 4. `components` tells how many components a tile is worth (1, 2 or 4, at
-// most `mostComponents`), or 0 where there is nothing to do: that tile of `out` stays as it is. It is called from many
-// threads at once. `out` overlaps no input. Same bits for any number of threads.
-void denoiseTiles(const CompositionalNet& net, const CompositionalInput& frame, int mostComponents,
-                  const std::function<int(const Window& tile)>& components, const Planes& out,
-                  const TileParams& params = {}, const Progress& progress = {});
+// Denoises the tiles of a frame whose sides are multiples of 4; what lies in no tile of `out` stays as it is. `out` overlaps
+// no input. `memory`: that the tiles were planned for; where not every thread's tile fits it, fewer threads work. Same bits
+// for any number of threads.
+void denoiseTiles(const CompositionalNet& net, const CompositionalInput& frame, std::span<const Tile> tiles,
+                  const Planes& out, size_t memory = 0, const Progress& progress = {});
 
 }  // namespace fathom::nn

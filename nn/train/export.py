@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Makes a weight file and its card of a training.
 
-    export.py OUT WEIGHTS.safetensors [--data "words on the frames"] [--limits "..."]
+    export.py OUT WEIGHTS.safetensors [--data "words on the frames"] [--limits "..."] [--frames FOLDER...]
 
 OUT is the folder that train.py wrote. The card, WEIGHTS.md, tells what the weights were trained on, for how long, and
-what they reach on the held-out frames by the last rows of the log.
+what they reach on the held-out frames by the last rows of the log. From the frames in --frames, of which as many as
+--every says are taken, it is found how many components a tile is worth (components.py); without them it is always one.
 """
 
 import argparse
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import torch
 
+import components
 from model import COMPONENTS
 from weights import load_model, save_model
 
@@ -66,6 +68,8 @@ def main(arguments=None):
     parser.add_argument("weights", type=Path)
     parser.add_argument("--data", help="words on where the frames come from")
     parser.add_argument("--limits", default=LIMITS)
+    parser.add_argument("--frames", nargs="+", default=[], help="folders of frames with references")
+    parser.add_argument("--every", type=int, default=2, help="of the frames, each N-th")
     options = parser.parse_args(arguments)
     checkpoint = options.training / "checkpoint.pt"
     saved = torch.load(checkpoint, map_location="cpu")
@@ -73,6 +77,8 @@ def main(arguments=None):
     name = options.weights.stem
     metadata = {"name": name, "licence": LICENCE, "steps": str(saved["step"]), "trained": time.strftime("%Y-%m-%d")}
     save_model(options.weights, model, metadata)
+    if options.frames:
+        components.main([str(options.weights), *options.frames, "--every", str(options.every)])
     rows = last_rows(options.training / "log.csv", saved["step"])
     text = card(name, model, saved, rows, options.data, options.limits)
     options.weights.with_suffix(".md").write_text(text)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from blocks import statistics
 from model import COMPONENTS, INPUTS, denoised
 from weights import load_model, write_tensors
 
@@ -22,7 +23,7 @@ def golden(model, width, height, seed=7):
     colour = random.exponential(0.5, (3, height, width)).astype(np.float32)
     inputs = random.uniform(-1, 1, (INPUTS, height, width)).astype(np.float32)
     inputs[:3] = np.log1p(colour)
-    tensors = {"input": inputs, "colour": colour}
+    tensors = {"input": inputs, "colour": colour, "statistics": statistics(inputs)}
     with torch.no_grad():
         for k in COMPONENTS:
             result = denoised(model, torch.from_numpy(inputs)[None], torch.from_numpy(colour)[None], k)

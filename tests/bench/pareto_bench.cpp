@@ -78,6 +78,7 @@ void measureTimes(ParetoResult& result, const ParetoFrame& frame, double megapix
     result.methods[i].secondsPerMegapixel = median(seconds[i]) / (width * height * 1e-6);
   result.binsPerPixel = double(deep.samples()) / double(deep.pixels());
   result.calibration = median(calibrations);
+  result.lights = deep.find("diffuse.R") && deep.find("specular.R") ? 2 : 1;
 }
 
 void write(const ParetoResult& result, const std::string& output) {

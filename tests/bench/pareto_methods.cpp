@@ -1,14 +1,31 @@
 #include "tests/bench/pareto_methods.h"
 
+#include <fmt/format.h>
+
 #include "cli/denoise_budget.h"
 #include "cli/denoise_job.h"
 #include "deep/flatten.h"
 #include "deep/one_bin.h"
 #include "flat/oidn.h"
+#include "nn/module.h"
 
 namespace fathom::bench {
 
 using deep::Quality;
+
+namespace {
+
+void addNeural(std::vector<Method>& methods) {
+  if (!cli::hasModel({})) return;
+  for (const Quality quality : {Quality::Balanced, Quality::Fast})
+    for (const int components : {1, 2, 4, 0})
+      if (quality == Quality::Balanced || nn::machineHasBfloat16())
+        methods.push_back({fmt::format("neural {}{}", quality == Quality::Fast ? "bfloat16 " : "",
+                                       components ? fmt::format("K = {}", components) : "K by tile"),
+                           {quality, false, "neural", components}});
+}
+
+}  // namespace
 
 std::vector<Method> paretoMethods() {
   const bool network = cli::findOidn({}) != nullptr;
@@ -21,6 +38,7 @@ std::vector<Method> paretoMethods() {
         methods.push_back(
             {name + (guide == std::string("none") ? "" : std::string(" + ") + guide), {quality, true, guide}});
   for (const auto& [name, quality] : qualities) methods.push_back({"nlm " + name, {quality, false, "nlm"}});
+  addNeural(methods);
   if (!network) return methods;
   methods.push_back({"oidn fast", {Quality::Fast, false, "oidn"}});
   methods.push_back({"oidn plain", {Quality::Balanced, false, "oidn"}, true});

@@ -20,7 +20,8 @@ struct Method {
               // no option of the program gives
 };
 
-// Those with Open Image Denoise only where its library is found.
+// Those with Open Image Denoise only where its library is found, those with the network only where a model is installed; in
+// bfloat16 (`fast`) only where the processor has it.
 std::vector<Method> paretoMethods();
 
 // A file as a method's plan has it.

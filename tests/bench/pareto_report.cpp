@@ -47,8 +47,9 @@ struct Costs {
 };
 
 Costs costsOf(const ParetoResult& result, const MethodResult& of) {
-  const auto& [quality, isDeep, with] = of.method.setting;
+  const auto& [quality, isDeep, with, components] = of.method.setting;
   const double seconds = of.secondsPerMegapixel;
+  if (!isDeep && with == "neural") return {0, 0, seconds / result.lights};
   if (!isDeep) return with == "oidn" ? Costs{0, 0, seconds} : Costs{seconds, 0, 0};
   const double alone = secondsOf(result, {quality, true, "none"}), flat = secondsOf(result, {quality, false, "nlm"});
   const double more = std::max(0.01, result.binsPerPixel - 1);
@@ -119,14 +120,16 @@ Plot setPlot(const ParetoResult& result, const std::string& set, bool bins) {
 std::string costRows(const ParetoResult& result) {
   std::string text;
   for (const MethodResult& of : result.methods) {
-    if (of.method.plainGuides) continue;
     const cli::DenoiseSetting& setting = of.method.setting;
+    if (of.method.plainGuides || (setting.with == "neural" && !setting.components)) continue;
     const Costs costs = costsOf(result, of);
     const MeanErrors means = meansOf(of, kRendered);
     const double share = means.flattenedShare.value_or(1);
     const double error = means.binsShare && setting.deep ? std::sqrt(share * *means.binsShare) : share;
-    text += fmt::format("{{{{Quality::{}, {}, \"{}\"}}, {:.3g}, {:.3g}, {:.3g}, {:.3g}}},\n", nameOf(setting.quality),
-                        setting.deep, setting.with, costs.perMegapixel, costs.perMillionBins, costs.network, error);
+    const std::string components = setting.components ? fmt::format(", {}", setting.components) : "";
+    text += fmt::format("{{{{Quality::{}, {}, \"{}\"{}}}, {:.3g}, {:.3g}, {:.3g}, {:.3g}}},\n", nameOf(setting.quality),
+                        setting.deep, setting.with, components, costs.perMegapixel, costs.perMillionBins, costs.network,
+                        error);
   }
   return text + fmt::format("constexpr double kCalibration = {:.3g};\n", result.calibration);
 }

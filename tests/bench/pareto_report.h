@@ -29,6 +29,7 @@ struct ParetoResult {
   std::vector<std::string> sets;  // in the order of their tables
   double binsPerPixel = 0;        // of the deep frame that was timed
   double calibration = 0;         // seconds, see cli/calibration
+  int lights = 1;                 // that the frame has apart, which the network denoises one by one
 };
 
 // Geometric means over the frames of a set that have the figure; nothing where none has.

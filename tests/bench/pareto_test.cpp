@@ -148,6 +148,15 @@ TEST(ParetoReport, TheNetworkCostsTheSameAtAnyQuality) {
   EXPECT_THAT(costRows(result), HasSubstr("{Quality::Fast, true, \"oidn\"}, 2, 3, 8,")) << "7 and 9";
 }
 
+TEST(ParetoReport, TheNetworkCostsByLightsAndComponents) {
+  ParetoResult result = madeUp();
+  result.lights = 2;
+  for (const int components : {0, 4})
+    result.methods.push_back(
+        {{"neural", {Quality::Fast, false, "neural", components}}, 3, {{"as rendered", "a", 1, 0.02, {}, {}}}});
+  EXPECT_THAT(costRows(result), HasSubstr("{{Quality::Fast, false, \"neural\", 4}, 0, 0, 1.5, 0.02},\nconstexpr"));
+}
+
 TEST(ParetoReport, NoCostIsBelowZero) {
   ParetoResult result = madeUp();
   result.methods[2].secondsPerMegapixel = 1;  // a steeper line than through nothing

@@ -82,8 +82,23 @@ TEST(TimeBudget, CostsAreLinearInPixelsAndBins) {
   EXPECT_GT(one, 7) << "the network sees no components";
 }
 
+TEST(TimeBudget, TheNetworkCostsByItsLightsAndItsSize) {
+  const SettingCost cost{{Quality::Fast, false, "neural", 2}, 0, 0, 3, 0.5};
+  const Workload one{.megapixels = 2, .components = false};
+  EXPECT_DOUBLE_EQ(expectedSeconds(cost, one, 1), 2 * 3);
+  Workload other = one;
+  other.components = true;
+  EXPECT_DOUBLE_EQ(expectedSeconds(cost, other, 1), 2 * 2 * 3);
+  other.networkWork = 3.5;
+  EXPECT_DOUBLE_EQ(expectedSeconds(cost, other, 1), 2 * 2 * 3 * 3.5);
+  other.bfloat16 = false;
+  EXPECT_GT(expectedSeconds(cost, other, 1), 2 * 2 * 3 * 3.5 * 1.5);
+  const SettingCost full{{Quality::Balanced, false, "neural", 2}, 0, 0, 3, 0.5};
+  EXPECT_DOUBLE_EQ(expectedSeconds(full, other, 1), 2 * 2 * 3 * 3.5) << "float32 anyway";
+}
+
 TEST(TimeBudget, TheMeasurementHasEverySetting) {
-  const std::vector<std::string> guides = {"none", "nlm", "oidn"}, bases = {"nlm", "oidn"};
+  const std::vector<std::string> guides = {"none", "nlm", "oidn"}, bases = {"nlm", "neural", "oidn"};
   std::set<std::string> names;
   for (const bool isDeep : {true, false})
     for (const SettingCost& cost : cli::costsOf(isDeep, isDeep ? guides : bases)) {
@@ -91,7 +106,7 @@ TEST(TimeBudget, TheMeasurementHasEverySetting) {
       EXPECT_GT(expectedSeconds(cost, {}, 1), 0) << describeSetting(cost.setting);
       EXPECT_TRUE(cost.error > 0 && cost.error < 1) << describeSetting(cost.setting);
     }
-  EXPECT_EQ(names.size(), 9 + 3 + 2);
+  EXPECT_EQ(names.size(), 9 + 3 + 2 + 6);
   EXPECT_EQ(names.size(), cli::measuredCosts().size());
   EXPECT_GT(cli::measuredCalibration(), 0);
 }
@@ -109,6 +124,7 @@ TEST(TimeBudget, AGuideOfAFileCostsNothing) {
 TEST(TimeBudget, SettingsAreOptionsAndReadBack) {
   EXPECT_EQ(cli::describeSetting({Quality::Best, true, "nlm"}), "--quality best --flat-guide nlm");
   EXPECT_EQ(cli::describeSetting({Quality::Fast, false, "oidn"}), "--quality fast --method oidn");
+  EXPECT_EQ(cli::describeSetting({Quality::Fast, false, "neural", 4}), "--quality fast --method neural --components 4");
   for (const SettingCost& cost : cli::measuredCosts())
     EXPECT_EQ(cli::parseSetting(describeSetting(cost.setting)), cost.setting);
   for (const char* text : {"", "--quality best", "--quality best --flat-guide nlm ", "--quality worst --method nlm"})
@@ -157,6 +173,47 @@ TEST(DenoiseBudget, FlatFramesKeepTheBaseThatIsNamed) {
   EXPECT_THAT(planned.choice(), HasSubstr("--method oidn"));
 }
 
+TEST(DenoiseBudget, TheNetworkIsChosenFromLikeTheOthers) {
+  Planned planned(false);
+  planned.request.timeBudget = 1e-6;
+  EXPECT_EQ(planned.choice(), "--quality fast --method neural --components 1") << "the quickest";
+  planned.request.memory = 100'000'000;
+  EXPECT_EQ(planned.choice(), "--quality fast --method nlm") << "which needs no whole frames";
+  planned.request.memory = size_t(8) << 30;
+  planned.request.base.model = "/nowhere.safetensors";
+  EXPECT_EQ(planned.choice(), "--quality fast --method nlm") << "no model that could be read";
+  planned.request.anyBase = false;
+  planned.request.base.name = "neural";
+  EXPECT_THROW(planned.choice(), Error);
+  planned.request.base.model.clear();
+  planned.request.timeBudget = 1000;
+  EXPECT_THAT(planned.choice(), HasSubstr("--method neural --components 4"));
+  planned.request.base.components = 2;
+  EXPECT_THAT(planned.choice(), HasSubstr("--method neural --components 2"));
+}
+
+// What estimates say decides among those that fit, and nothing else.
+TEST(DenoiseBudget, EstimatedErrorsDecideAmongTheBasesThatFit) {
+  Planned planned(false);
+  std::set<std::string> asked;
+  const auto choice = [&](double budget, const std::string& best) {
+    planned.request.timeBudget = budget;
+    asked.clear();
+    const cli::ErrorOf errorOf = [&](const DenoiseSetting& setting) {
+      asked.insert(setting.with);
+      return setting.with == best ? 1.0 : 2.0;
+    };
+    return describeSetting(planBudget(
+                               planned.request, planned.plan, {}, [] { return 1.0; }, errorOf)
+                               .setting);
+  };
+  EXPECT_EQ(choice(1000, "neural"), "--quality fast --method neural --components 4") << "of equals the quicker";
+  EXPECT_EQ(choice(1000, "nlm"), "--quality best --method nlm");
+  EXPECT_EQ(asked, (std::set<std::string>{"neural", "nlm"}));
+  EXPECT_THAT(choice(0.8, "nlm"), HasSubstr("--method neural")) << "the other takes longer";
+  EXPECT_TRUE(asked.empty()) << "one is left";
+}
+
 TEST(DenoiseBudget, ASettingIsARequestAndNothingElse) {
   cli::DenoiseRequest request;
   request.guide = "guide.exr";
@@ -164,6 +221,7 @@ TEST(DenoiseBudget, ASettingIsARequestAndNothingElse) {
   EXPECT_EQ(cli::withSetting(request, {Quality::Best, true, "nlm"}).guide, "nlm");
   EXPECT_EQ(cli::withSetting(request, {Quality::Best, true, "nlm"}).params.quality, Quality::Best);
   EXPECT_EQ(cli::withSetting(request, {Quality::Fast, false, "oidn"}).base.name, "oidn");
+  EXPECT_EQ(cli::withSetting(request, {Quality::Fast, false, "neural", 4}).base.components, 4);
 }
 
 // A folder with frames in.0001.exr to in.0003.exr.
@@ -173,7 +231,8 @@ class DenoiseWithBudget : public testing::Test {
     for (unsigned i = 1; i <= 3; ++i) deep::write(folder_ / fmt::format("in.{:04}.exr", i), makeNoisyFrame(24, 20, i));
   }
   Ran run(const std::string& arguments) const {
-    return runFathom("denoise --oidn-library /nowhere " + arguments, "cd '" + folder_.path() + "';");
+    return runFathom("denoise --oidn-library /nowhere " + arguments,
+                     "cd '" + folder_.path() + "'; FATHOM_MODELS=/nowhere");
   }
   Ran runAll(const std::string& options) const { return run("in.####.exr -o out.####.exr " + options); }
   cli::BudgetRecord record(const std::string& name) const {

@@ -14,6 +14,7 @@
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "flat/io.h"
+#include "nn/components.h"
 #include "tests/reference/compositional.h"
 #include "tests/reference/noisy_flat.h"
 #include "tests/reference/noisy_frame.h"
@@ -184,11 +185,52 @@ TEST_F(NeuralDenoise, ItsMemoryCounts) {
   EXPECT_EQ(run("in.exr -o out.exr --method neural --memory " + enough + "M").status, 0) << enough;
 }
 
-TEST_F(NeuralDenoise, HasNoPlaceInATimeBudget) {
-  const Ran outcome = run("in.exr -o out.exr --method neural --time-budget 10");
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("--time-budget: expected a method or guide whose cost is known"));
-  EXPECT_EQ(run("in.exr -o out.exr --method auto --time-budget 1000").status, 0);
+TEST_F(NeuralDenoise, HasItsPlaceInATimeBudget) {
+  const Ran outcome = run("in.exr -o out.exr --method neural --time-budget 1000");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("1000 s a frame allow --quality fast --method neural --components 4"));
+  EXPECT_THAT(run("in.exr -o out.exr --quality fast --method neural --components 4").out, HasSubstr("done before"));
+  EXPECT_THAT(run("in.exr -o two.exr --method neural --components 2 --time-budget 1000").err,
+              HasSubstr("allow --quality fast --method neural --components 2"));
+  const Ran automatic = run("in.exr -o auto.exr --method auto --time-budget 1000");
+  ASSERT_EQ(automatic.status, 0) << automatic.err;
+  EXPECT_THAT(run("in.exr -o auto.exr --method auto --time-budget 1000").out, HasSubstr("done before"));
+  const Ran deepOne = run("deep.exr -o d.exr --flat-guide neural --time-budget 10");
+  EXPECT_NE(deepOne.status, 0);
+}
+
+// Coefficients with which every block is worth as many components as can be, or one.
+TEST_F(NeuralDenoise, ComponentsAreThoseThatTilesAreWorth) {
+  const auto write = [&](const std::string& first) {
+    reference::PlainWeights weights = reference::randomCompositional(16, 1);
+    std::string zeros;
+    for (size_t i = 1; i < nn::kBlockStatistics; ++i) zeros += " 0";
+    weights.metadata["components.gain2"] = fmt::format("0{}", zeros);
+    weights.metadata["components.gain4"] = fmt::format("{}{}", first, zeros);
+    const reference::Bytes bytes = reference::safetensors(weights);
+    std::ofstream(folder_ / "models/small.safetensors", std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  };
+  for (const auto& [gain, components] : {std::pair("0.4", "4"), std::pair("-0.4", "1")}) {
+    write(gain);
+    ASSERT_EQ(run("in.exr -o auto.exr --method neural --overwrite --stats stats.json").status, 0);
+    ASSERT_EQ(run(fmt::format("in.exr -o fixed.exr --method neural --overwrite --components {}", components)).status,
+              0);
+    EXPECT_TRUE(sameValues(read("auto.exr"), read("fixed.exr"), "R")) << gain;
+    const auto counts = nlohmann::json::parse(bytes("stats.json"))["total"]["counts"];
+    EXPECT_EQ(counts["network pixels in 4 components"], components == std::string("4") ? 2 * 80 * 52 : 0);
+  }
+}
+
+TEST_F(NeuralDenoise, ProgressiveKeepsItWithinTheMemory) {
+  const Ran outcome = fathom("progressive in.exr -o out.exr --method neural --memory 6M");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("in.exr: expected at least"));
+  EXPECT_FALSE(exists("out.exr"));
+  const size_t at = outcome.err.find("at least ") + 9;
+  const std::string enough = outcome.err.substr(at, outcome.err.find(" MB", at) - at);
+  EXPECT_EQ(fathom("progressive in.exr -o out.exr --method neural --memory " + enough + "M").status, 0) << enough;
 }
 
 TEST_F(NeuralDenoise, ModelsAreListed) {

@@ -38,7 +38,7 @@ TEST_F(Train, TrainsAndExports) {
   ASSERT_EQ(done.status, 0) << done.err;
   EXPECT_THAT(textOf(folder / "train.txt"),
               HasSubstr("--data renders programs --out out --width 32 --steps 123 --threads 3"));
-  EXPECT_EQ(textOf(folder / "export.txt"), "out out/base.safetensors --data our renders\n");
+  EXPECT_EQ(textOf(folder / "export.txt"), "out out/base.safetensors --data our renders --frames renders programs\n");
   EXPECT_THAT(done.out, HasSubstr("--method neural --model out/base.safetensors"));
 }
 

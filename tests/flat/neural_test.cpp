@@ -125,17 +125,18 @@ TEST(Neural, TilesWithoutNoiseAreSkipped) {
     for (size_t i = 0; i < 512U * 64; ++i)
       if (i % 512 >= 200) half.find("variance." + c)->values[i] = 0;
   NeuralCounts all, fewer;
-  const NeuralParams params{.components = 1, .memory = 1};  // the smallest tiles
+  const NeuralParams params{.components = 1};
   denoiseNeural(net(), params, noisy, {}, &all);
   EXPECT_EQ(all.denoised, 2U * 512 * 64);
   EXPECT_EQ(all.skipped, 0U);
   const Image cut = denoiseNeural(net(), params, half, {}, &fewer);
   EXPECT_EQ(fewer.denoised + fewer.skipped, 2U * 512 * 64);
-  EXPECT_EQ(fewer.skipped, 2U * 256 * 64);
-  NeuralCounts none;
-  const Image whole = denoiseNeural(net(), {.components = 1}, half, {}, &none);
-  EXPECT_EQ(none.skipped, 0U);
-  EXPECT_LT(difference(whole, cut), 1e-5);
+  EXPECT_EQ(fewer.skipped, 2U * 256 * 64) << "the block that the edge lies in has work";
+  Image whole = denoiseNeural(net(), params, noisy);
+  for (Plane& plane : whole.planes)
+    for (size_t i = 0; i < 512U * 64; ++i)
+      if (i % 512 >= 200) plane.values[i] = half.get(plane.name).values[i];
+  EXPECT_LT(difference(whole, cut), 1e-4) << "but for what half of them is known to be";
 }
 
 TEST(Neural, OddValuesNeverSpread) {

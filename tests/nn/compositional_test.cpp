@@ -6,69 +6,22 @@
 
 #include "base/error.h"
 #include "nn/tiles.h"
-#include "tests/reference/compositional.h"
+#include "tests/reference/random_planes.h"
 
 namespace fathom::nn {
 namespace {
 
 using reference::CompositionalTwin;
+using reference::fileOf;
+using reference::Frame;
+using reference::largest;
+using reference::largestDifference;
 using reference::PlainWeights;
 using reference::randomCompositional;
-using reference::randomVolume;
+using reference::small;
+using reference::tiled;
 using reference::Volume;
-
-WeightFile fileOf(const PlainWeights& weights) {
-  return readWeights(reference::safetensors(weights), "random");
-}
-
-// Random planes and colours, and what of them a network takes.
-struct Frame {
-  Volume planes, colour;
-  std::vector<float> planeValues, colourValues;
-
-  Frame(int height, int width, uint32_t seed)
-      : planes(randomVolume(kInputPlanes, height, width, seed, -1, 1)),
-        colour(randomVolume(3, height, width, seed + 1, 0, 3)),
-        planeValues(floatsOf(planes)),
-        colourValues(floatsOf(colour)) {}
-
-  CompositionalInput input() const {
-    return {denseRows(planeValues.data(), kInputPlanes, colour.height, colour.width),
-            denseRows(colourValues.data(), 3, colour.height, colour.width), colour.height, colour.width};
-  }
-  size_t values() const { return colourValues.size(); }
-};
-
-std::vector<float> whole(const CompositionalNet& net, const Frame& frame, int components) {
-  std::vector<float> result(frame.values(), -1.0f);
-  CompositionalNet::Workspace workspace;
-  const CompositionalInput input = frame.input();
-  net.denoise(input, {0, 0, input.width, input.height}, components,
-              denseRows(result.data(), 3, input.height, input.width), workspace);
-  return result;
-}
-
-std::vector<float> tiled(const CompositionalNet& net, const Frame& frame, int most, const TileParams& params,
-                         const std::function<int(const Window&)>& components, const Progress& progress = {}) {
-  std::vector<float> result(frame.values(), -1.0f);
-  const CompositionalInput input = frame.input();
-  denoiseTiles(net, input, most, components, denseRows(result.data(), 3, input.height, input.width), params, progress);
-  return result;
-}
-
-template <class T>
-double largest(const std::vector<T>& values) {
-  double most = 0;
-  for (const T v : values) most = std::max(most, std::fabs(double(v)));
-  return most;
-}
-
-template <class A, class B>
-double largestDifference(const std::vector<A>& a, const std::vector<B>& b) {
-  double most = 0;
-  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(double(a[i]) - double(b[i])));
-  return most;
-}
+using reference::whole;
 
 TEST(CompositionalNet, EqualsItsTwin) {
   for (const int width : {16, 32}) {
@@ -109,51 +62,6 @@ TEST(CompositionalNet, KeepsAColourThatIsTheSameEverywhere) {
   for (const float v : whole(net, frame, 1)) ASSERT_NEAR(v, 0.7f, 1e-5f);
 }
 
-// Weights with which every 3x3 convolution shifts by a pixel, so that what is far away counts most.
-PlainWeights shifting(bool left) {
-  PlainWeights weights = randomCompositional(16, 2);
-  for (auto& [name, tensor] : weights.tensors) {
-    if (!name.ends_with(".weight") || tensor.shape[2] == 1) continue;
-    const int width = int(tensor.shape[3]);
-    for (size_t i = 0; i < tensor.values.size(); ++i) {
-      const bool kept = width == 2 || int(i) % width == (left ? 2 : 0);
-      tensor.values[i] = kept ? (0.5f + std::fabs(tensor.values[i])) / float(tensor.shape[1] * width) : 0.0f;
-    }
-  }
-  return weights;
-}
-
-TEST(CompositionalNet, HaloIsWhatTheOutputDependsOn) {
-  constexpr int kHeight = 8, kWidth = 320, kAt = 160;
-  for (const int components : {1, 2, 4}) {
-    int reached = 0, halo = 0;
-    for (const bool left : {false, true}) {
-      const CompositionalNet net(fileOf(shifting(left)));
-      halo = net.halo(components);
-      const Frame frame(kHeight, kWidth, 3);
-      const std::vector<float> before = whole(net, frame, components);
-      for (int at = kAt; at < kAt + 4; ++at) {
-        Frame changed(kHeight, kWidth, 3);
-        for (int p = 0; p < kInputPlanes; ++p) changed.planeValues[size_t((p * kHeight + 4) * kWidth + at)] += 500;
-        for (int c = 0; c < 3; ++c) changed.colourValues[size_t((c * kHeight + 4) * kWidth + at)] += 500;
-        const std::vector<float> after = whole(net, changed, components);
-        for (size_t i = 0; i < after.size(); ++i) {
-          // The distance from the tile, of the network's alignment, that a pixel lies in.
-          const int x = int(i % kWidth), tile = x - x % CompositionalNet::kAlignment;
-          if (before[i] != after[i])
-            reached = std::max({reached, tile - at, at - (tile + CompositionalNet::kAlignment - 1)});
-        }
-      }
-    }
-    EXPECT_LE(reached, halo) << "K = " << components;
-    // Each step rounds up; what passes two decompositions is too little to see.
-    if (components < 4) {
-      EXPECT_GT(reached, halo - 4 * (2 + components / 2)) << "K = " << components;
-    }
-    EXPECT_EQ(halo % CompositionalNet::kAlignment, 0);
-  }
-}
-
 TEST(CompositionalNet, CountsItsArithmetic) {
   const CompositionalNet net(fileOf(randomCompositional(16, 1)));
   // Multiplications per pixel of the encoder, of what is between its features and y0, y1, x2, and of what follows.
@@ -171,85 +79,63 @@ TEST(CompositionalNet, CountsItsArithmetic) {
 TEST(Tiles, EqualTheWhole) {
   const CompositionalNet net(fileOf(randomCompositional(16, 4)));
   const Frame frame(200, 148, 9);
-  TileParams params;
-  params.memory = 1;  // the smallest tiles
-  const std::vector<Window> tiles = tilesOf(net, 200, 148, 4, params);
-  ASSERT_GE(tiles.size(), 6U);
   for (const int components : {1, 2, 4}) {
+    ASSERT_GE(planTiles(net, 200, 148, small(components)).size(), 6U);
     const std::vector<float> expected = whole(net, frame, components);
-    const std::vector<float> result = tiled(net, frame, components, params, [&](const Window&) { return components; });
+    const std::vector<float> result = tiled(net, frame, small(components));
     EXPECT_LT(largestDifference(result, expected), 1e-5 * largest(expected)) << "K = " << components;
   }
-}
-
-TEST(Tiles, CoverTheFrameOnce) {
-  const CompositionalNet net(fileOf(randomCompositional(16, 4)));
-  for (const size_t memory : {size_t(0), size_t(1), size_t(300) << 20})
-    for (const auto& [height, width] :
-         {std::pair(4, 4), std::pair(64, 68), std::pair(1080, 1920), std::pair(516, 2000)}) {
-      std::vector<int> covered(size_t(height) * size_t(width));
-      for (const Window& tile : tilesOf(net, height, width, 4, {memory})) {
-        ASSERT_TRUE(tile.x % 4 == 0 && tile.y % 4 == 0 && tile.width % 4 == 0 && tile.height % 4 == 0);
-        for (int y = tile.y; y < tile.y + tile.height; ++y)
-          for (int x = tile.x; x < tile.x + tile.width; ++x) ++covered[size_t(y) * size_t(width) + size_t(x)];
-      }
-      EXPECT_EQ(std::ranges::count(covered, 1), ptrdiff_t(covered.size()));
-    }
 }
 
 TEST(Tiles, AreTheSameForAnyNumberOfThreads) {
   const CompositionalNet net(fileOf(randomCompositional(16, 4)));
   const Frame frame(200, 148, 9);
-  const auto two = [](const Window&) { return 2; };
   std::vector<float> results[2];
   for (const size_t threads : {1, 2}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    results[threads - 1] = tiled(net, frame, 2, {.memory = 1}, two);
+    results[threads - 1] = tiled(net, frame, small(2));
   }
-  const std::vector<float> unlimited = tiled(net, frame, 2, {.memory = 1}, two);
   EXPECT_EQ(results[0], results[1]);
-  EXPECT_EQ(results[0], unlimited);
+  EXPECT_EQ(results[0], tiled(net, frame, small(2)));
 }
 
 TEST(Tiles, AreSkippedWhereThereIsNothingToDo) {
   const CompositionalNet net(fileOf(randomCompositional(16, 4)));
   const Frame frame(128, 128, 9);
-  const TileParams params = {.memory = 1};
-  const std::vector<float> all = tiled(net, frame, 1, params, [](const Window&) { return 1; });
-  const std::vector<float> some = tiled(net, frame, 1, params, [](const Window& tile) { return tile.x == 0 ? 0 : 1; });
-  const int edge = tilesOf(net, 128, 128, 1, params).front().width;
-  ASSERT_LT(edge, 128);
+  const std::vector<float> all = tiled(net, frame, small(1));
+  const std::vector<float> some =
+      tiled(net, frame, small(1), [](const Window& block) { return BlockWorth{.work = block.x > 0}; });
   for (int c = 0; c < 3; ++c)
     for (int y = 0; y < 128; ++y)
       for (int x = 0; x < 128; ++x) {
         const size_t i = size_t((c * 128 + y) * 128 + x);
-        ASSERT_EQ(some[i], x < edge ? -1.0f : all[i]);
+        ASSERT_EQ(some[i], x < kBlock ? -1.0f : all[i]);
       }
 }
 
 TEST(Tiles, HaveComponentsOfTheirOwn) {
   const CompositionalNet net(fileOf(randomCompositional(16, 4)));
-  const Frame frame(64, 256, 9);
-  const TileParams params = {.memory = 1};
-  const auto componentsOf = [](const Window& tile) { return tile.x < 128 ? 1 : 4; };
-  const std::vector<float> mixed = tiled(net, frame, 4, params, componentsOf);
-  const std::vector<float> one = tiled(net, frame, 4, params, [](const Window&) { return 1; });
-  const std::vector<float> four = tiled(net, frame, 4, params, [](const Window&) { return 4; });
-  ASSERT_NE(one, four);
-  for (size_t i = 0; i < mixed.size(); ++i) ASSERT_EQ(mixed[i], i % 256 < 128 ? one[i] : four[i]);
+  const Frame frame(64, 512, 9);
+  const TileParams open = {.least = 1, .most = 4};
+  const auto worth = [](const Window& block) { return BlockWorth{.gain = {0, block.x < 256 ? 0.0 : 0.5}}; };
+  const std::vector<Tile> tiles = planTiles(net, 64, 512, open, worth);
+  EXPECT_EQ(tiles, (std::vector<Tile>{{{0, 0, 256, 64}, 1}, {{256, 0, 256, 64}, 4}}));
+  const std::vector<float> mixed = tiled(net, frame, open, worth);
+  const std::vector<float> one = whole(net, frame, 1), four = whole(net, frame, 4);
+  for (size_t i = 0; i < mixed.size(); ++i)
+    ASSERT_NEAR(mixed[i], i % 512 < 256 ? one[i] : four[i], 1e-5 * largest(four)) << i;
 }
 
 TEST(Tiles, ReportAndStop) {
   const CompositionalNet net(fileOf(randomCompositional(16, 4)));
   const Frame frame(128, 128, 9);
-  const auto one = [](const Window&) { return 1; };
   double last = 0;
   Progress progress;
   progress.report = [&](double done) {
     EXPECT_GE(done, last);
     last = done;
   };
-  tiled(net, frame, 1, {.memory = 1}, one, progress);
+  tiled(net, frame, small(1), {}, progress);
   EXPECT_DOUBLE_EQ(last, 1);
 
   std::stop_source source;
@@ -259,7 +145,7 @@ TEST(Tiles, ReportAndStop) {
                      after += source.stop_requested();
                    },
                    source.get_token()};
-  EXPECT_THROW(tiled(net, frame, 1, {.memory = 1}, one, stopped), Cancelled);
+  EXPECT_THROW(tiled(net, frame, small(1), {}, stopped), Cancelled);
   EXPECT_EQ(after, 1);
 }
 

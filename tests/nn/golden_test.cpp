@@ -11,7 +11,7 @@ namespace fathom::nn {
 namespace {
 
 // FATHOM_NN_GOLDEN: a folder with tiny.safetensors, the weights, and golden.safetensors with the tensors input
-// (24 x height x width), colour and output1, output2, output4 (3 x height x width), as nn/train/golden.py writes them.
+// (24 x height x width), colour, statistics (of the input as one block), and output1, output2, output4 (3 x height x width), as nn/train/golden.py writes them.
 TEST(CompositionalNet, EqualsTraining) {
   const char* given = std::getenv("FATHOM_NN_GOLDEN");
   const std::string folder = given ? given : "";
@@ -27,6 +27,10 @@ TEST(CompositionalNet, EqualsTraining) {
   const Tensor& colour = source.take("colour", {3, height, width});
   const CompositionalInput input = {denseRows(planes.values.data(), kInputPlanes, height, width),
                                     denseRows(colour.values.data(), 3, height, width), height, width};
+  const Tensor& statistics = source.take("statistics", {int64_t(kBlockStatistics)});
+  const BlockStatistics found = blockStatistics(input.planes, height, width);
+  for (size_t i = 0; i < kBlockStatistics; ++i) EXPECT_NEAR(found[i], statistics.values[i], 1e-5) << i;
+  EXPECT_TRUE(net.gains().known());
   CompositionalNet::Workspace workspace;
   for (const int components : {1, 2, 4}) {
     const Tensor& expected = source.take("output" + std::to_string(components), {3, height, width});

@@ -27,6 +27,7 @@ import export
 import golden
 import mix_export
 import train
+from blocks import NAMES
 from frames import find
 from mix_model import Mix
 from model import COMPONENTS, Compositional
@@ -89,8 +90,13 @@ def check_resuming(folder, data):
 
 
 def check_weights(folder):
-    export.main([str(folder / "straight"), str(folder / "tiny.safetensors")])
+    frames = ["--frames", str(folder / "frames"), "--every", "1"]
+    export.main([str(folder / "straight"), str(folder / "tiny.safetensors"), *frames])
     tensors, metadata = read_tensors(folder / "tiny.safetensors")
+    for k in COMPONENTS[1:]:
+        coefficients = np.array(metadata[f"components.gain{k}"].split(), float)
+        whole = coefficients.shape == (len(NAMES),) and np.isfinite(coefficients).all()
+        expect(whole, "metadata: expected what components gain")
     expected = {name: tuple(x.shape) for name, x in Compositional(16).state_dict().items()}
     expect({name: x.shape for name, x in tensors.items()} == expected, "weights: expected the layers of the model")
     fixed = {"format": "fathom-compositional", "version": "1", "width": "16", "inputs": "24", "steps": str(STEPS)}
@@ -117,8 +123,9 @@ def check_mix(folder):
 def check_golden(folder):
     golden.main([str(folder / "tiny.safetensors"), str(folder / "golden.safetensors")])
     found, _ = read_tensors(folder / "golden.safetensors")
-    shapes = {"input": (24, 24, 40), **{name: (3, 24, 40) for name in ("colour", "output1", "output2", "output4")}}
-    expect({name: x.shape for name, x in found.items()} == shapes, "golden: expected input, colour and three outputs")
+    shapes = {name: (3, 24, 40) for name in ("colour", "output1", "output2", "output4")}
+    shapes.update({"input": (24, 24, 40), "statistics": (len(NAMES),)})
+    expect({name: x.shape for name, x in found.items()} == shapes, "golden: expected input, colour, statistics and three outputs")
     for k in COMPONENTS:
         expect(np.abs(found[f"output{k}"] - found["colour"]).mean() > 0.01, f"golden, K = {k}: expected a change")
 

@@ -1,0 +1,145 @@
+// How frames are cut for the network: what is covered, what is skipped, and what components are taken for.
+#include "nn/tile_plan.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+
+#include "tests/reference/compositional.h"
+
+namespace fathom::nn {
+namespace {
+
+const CompositionalNet& net() {
+  static const CompositionalNet made(
+      readWeights(reference::safetensors(reference::randomCompositional(16, 4)), "random"));
+  return made;
+}
+
+double costOf(const std::vector<Tile>& tiles, int height, int width) {
+  double sum = 0;
+  for (const Tile& tile : tiles) sum += net().flop(tile.window, height, width, tile.components);
+  return sum;
+}
+
+// How often each pixel is covered.
+std::vector<int> covered(const std::vector<Tile>& tiles, int height, int width) {
+  std::vector<int> result(size_t(height) * size_t(width));
+  for (const Tile& tile : tiles)
+    for (int y = tile.window.y; y < tile.window.y + tile.window.height; ++y)
+      for (int x = tile.window.x; x < tile.window.x + tile.window.width; ++x)
+        ++result[size_t(y) * size_t(width) + size_t(x)];
+  return result;
+}
+
+TEST(TilePlan, CoversTheFrameOnce) {
+  for (const size_t memory : {size_t(0), size_t(1), size_t(300) << 20})
+    for (const auto& [height, width] :
+         {std::pair(4, 4), std::pair(64, 68), std::pair(1080, 1920), std::pair(516, 2000)}) {
+      const std::vector<Tile> tiles = planTiles(net(), height, width, {.memory = memory, .least = 4, .most = 4});
+      for (const auto& [tile, components] : tiles) {
+        ASSERT_TRUE(tile.x % 4 == 0 && tile.y % 4 == 0 && tile.width % 4 == 0 && tile.height % 4 == 0);
+        ASSERT_EQ(components, 4);
+      }
+      EXPECT_EQ(std::ranges::count(covered(tiles, height, width), 1), ptrdiff_t(height) * width);
+    }
+}
+
+TEST(TilePlan, KeepsWithinTheMemory) {
+  for (const int components : {1, 2, 4})
+    for (const size_t memory : {size_t(50) << 20, size_t(1) << 30})
+      for (const Tile& tile :
+           planTiles(net(), 1080, 1920, {.memory = memory, .least = components, .most = components})) {
+        const bool smallest = std::max(tile.window.width, tile.window.height) <= 64;
+        EXPECT_TRUE(smallest || bytesOfTile(net(), tile) <= double(memory)) << tile.window.width;
+      }
+}
+
+// A frame whose work is in half of it costs half, wherever that half is.
+TEST(TilePlan, HalfTheWorkIsHalfTheCost) {
+  constexpr int kHeight = 1080, kWidth = 1920;
+  for (const int components : {1, 4}) {
+    const TileParams params = {.least = components, .most = components};
+    const double all = costOf(planTiles(net(), kHeight, kWidth, params), kHeight, kWidth);
+    const auto half = [&](const std::function<bool(const Window&)>& work) {
+      const auto worth = [&](const Window& block) { return BlockWorth{.work = work(block)}; };
+      return costOf(planTiles(net(), kHeight, kWidth, params, worth), kHeight, kWidth) / all;
+    };
+    EXPECT_LT(half([](const Window& b) { return b.x >= kWidth / 2; }), 0.58) << components;
+    EXPECT_LT(half([](const Window& b) { return b.y >= kHeight / 2; }), 0.58) << components;
+    // In the middle, of two thirds of the sides (0.44 of the area).
+    EXPECT_LT(half([](const Window& b) {
+                return b.x >= kWidth / 6 && b.x + b.width <= 5 * kWidth / 6 && b.y >= kHeight / 6 &&
+                       b.y + b.height <= 5 * kHeight / 6;
+              }),
+              0.6)
+        << components;
+  }
+}
+
+TEST(TilePlan, BlocksWithWorkAreCoveredAndEmptyFramesAreNot) {
+  const auto scattered = [](const Window& block) {
+    return BlockWorth{.work = (block.x / 64 * 7 + block.y / 64) % 5 == 0};
+  };
+  const std::vector<int> times = covered(planTiles(net(), 600, 900, {}, scattered), 600, 900);
+  EXPECT_LE(std::ranges::max(times), 1);
+  for (int y = 0; y < 600; ++y)
+    for (int x = 0; x < 900; ++x) {
+      // Blocks begin anew in each of the two parts of a side, 480 and 320 pixels long.
+      const Window block{x / 480 * 480 + x % 480 / 64 * 64, y / 320 * 320 + y % 320 / 64 * 64, 0, 0};
+      ASSERT_TRUE(times[size_t(y) * 900 + size_t(x)] == 1 || !scattered(block).work) << x << " " << y;
+    }
+  EXPECT_TRUE(planTiles(net(), 600, 900, {}, [](const Window&) { return BlockWorth{.work = false}; }).empty());
+}
+
+// Components are taken where the gain pays for the work, that of borders too.
+TEST(TilePlan, ComponentsAreTakenForWhatTheyGain) {
+  const auto componentsFor = [](double two, double four) {
+    const std::vector<Tile> tiles =
+        planTiles(net(), 480, 480, {.least = 1, .most = 4, .gainPerPass = 0.02}, [&](const Window&) {
+          return BlockWorth{.gain = {two, four}};
+        });
+    return tiles.size() == 1 ? tiles.front().components : 0;
+  };
+  const double two = 0.02 * (net().flopPerPixel(2) / net().flopPerPixel(1) - 1),
+               four = 0.02 * (net().flopPerPixel(4) / net().flopPerPixel(1) - 1);
+  EXPECT_EQ(componentsFor(0, 0), 1);
+  EXPECT_EQ(componentsFor(-1, -1), 1);
+  EXPECT_EQ(componentsFor(0.9 * two, 0.9 * four), 1);
+  EXPECT_EQ(componentsFor(1.1 * two, 1.02 * two), 2);
+  EXPECT_EQ(componentsFor(0.3 * two, 1.1 * four), 4);
+  // One block that gains is not worth its borders; many are.
+  const auto some = [](double gain, int side) {
+    const auto tiles = planTiles(net(), 480, 480, {.least = 1, .most = 4}, [&](const Window& block) {
+      return BlockWorth{.gain = {0, block.x < side && block.y < side ? gain : 0}};
+    });
+    return std::ranges::any_of(tiles, [](const Tile& tile) { return tile.components == 4; });
+  };
+  EXPECT_FALSE(some(1.1 * four, 64));
+  EXPECT_TRUE(some(2 * four, 320));
+}
+
+TEST(TilePlan, ComponentsDoNotDependOnMemoryOrThreads) {
+  const auto worth = [](const Window& block) {
+    return BlockWorth{.work = block.y < 700, .gain = {0.05, block.x < 700 ? 0.4 : 0.0}};
+  };
+  const auto componentsWith = [&](size_t memory) {
+    std::vector<int> result(size_t(1080) * 1920);
+    for (const auto& [tile, components] :
+         planTiles(net(), 1080, 1920, {.memory = memory, .least = 1, .most = 4}, worth))
+      for (int y = tile.y; y < tile.y + tile.height; ++y)
+        std::fill_n(result.begin() + ptrdiff_t(y) * 1920 + tile.x, tile.width, components);
+    return result;
+  };
+  const std::vector<int> expected = componentsWith(0);
+  EXPECT_GT(std::ranges::count(expected, 4), 0);
+  EXPECT_GT(std::ranges::count(expected, 1), 0);
+  EXPECT_GT(std::ranges::count(expected, 0), 0);
+  EXPECT_EQ(expected, componentsWith(1));
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(expected, componentsWith(0));
+}
+
+}  // namespace
+}  // namespace fathom::nn
