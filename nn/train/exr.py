@@ -122,7 +122,7 @@ def write(path, channels):
     """Writes {name: float32 (height, width)}; the tests make their frames with it."""
     if not OpenImageIO:
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        OpenEXR.File(header, {name: np.asarray(x, np.float32) for name, x in channels.items()}).write(str(path))
+        OpenEXR.File(header, {name: np.ascontiguousarray(x, np.float32) for name, x in channels.items()}).write(str(path))
         return
     height, width = next(iter(channels.values())).shape
     spec = OpenImageIO.ImageSpec(width, height, len(channels), OpenImageIO.FLOAT)

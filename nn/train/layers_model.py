@@ -26,6 +26,7 @@ LAYERS = (1, 2, 4)
 HIDDEN = 16  # of the partition
 FLOOR = 0.01
 LARGEST_LOGIT = 12.0
+STEEPEST = 1e-3  # gradient of a share; those of a loss that is a mean over crops are a hundredth of this
 TINY = 1e-12
 SCALES = 3
 
@@ -103,7 +104,8 @@ class Joined(nn.Module):
 
 
 class Sharpened(torch.autograd.Function):
-    """The partition with small parts taken off. Its gradient is the softmax's, or no sample would come back from a certain choice."""
+    """The partition with small parts taken off. Its gradient is the softmax's, or no sample would come back from a certain choice; and bounded:
+    the first sample of a layer that was empty changes all that is seen of it."""
 
     @staticmethod
     def forward(_, q):
@@ -112,7 +114,7 @@ class Sharpened(torch.autograd.Function):
 
     @staticmethod
     def backward(_, gradient):
-        return gradient
+        return gradient.clamp(-STEEPEST, STEEPEST)
 
 
 def rows_of(image):

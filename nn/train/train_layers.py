@@ -4,7 +4,8 @@
     train_layers.py --data FOLDER... --out FOLDER [--width 32] [--steps 20000] ...
 
 As train.py, on files of samples, X.samples.exr or X.<spp>.samples.exr, and their references. The scenes fur, coffee and living-room, and the
-shared frame staircase2, are never trained on; --share holds back some of the others.
+shared frame staircase2, are never trained on; --share holds back some of the others. With --start, weights or a checkpoint of a compositional
+denoiser of the same width, it begins with the U-net of that one's filter.
 
 Each step draws L from {1, 2, 4}. Batches are of the same size for all, since the layers are a small part of the work.
 """
@@ -29,9 +30,13 @@ class Training(train.Training):
 
     def first_model(self):
         settings = self.settings
-        model = load_model(settings.start, Layered).train() if settings.start else Layered(settings.width)
-        if model.width != settings.width:
-            raise SystemExit(f"train_layers.py: {settings.start}: expected width {settings.width}, found {model.width}")
+        model = Layered(settings.width)
+        if settings.start:
+            begun = load_model(settings.start).denoise
+            if begun.kernel0.in_channels != settings.width:
+                raise SystemExit(f"train_layers.py: {settings.start}: expected width {settings.width}, found {begun.kernel0.in_channels}")
+            known, taken = model.unet.state_dict(), begun.state_dict()
+            model.unet.load_state_dict({name: x if name.startswith("in.") else taken[name] for name, x in known.items()})
         return model
 
     def frames_and_batches(self):

@@ -207,18 +207,29 @@ class Data(unittest.TestCase):
 
 
 class Loss(unittest.TestCase):
-    def order(self, places, depth, pixel):
-        n = len(places)
+    def result(self, places, depth, pixel):
         partition = torch.nn.functional.one_hot(torch.tensor(places), 2).float()
-        listed = Samples(None, torch.ones(n), None, torch.tensor(depth), torch.tensor(pixel), (1, 4, 4))
-        return layers_loss.order(Result(*[None] * 5, partition, *[None] * 3), listed).item()
+        listed = Samples(None, torch.ones(len(places)), None, torch.tensor(depth), torch.tensor(pixel), (1, 4, 16))
+        return Result(*[None] * 5, partition, *[None] * 3), listed
+
+    def order(self, *given):
+        return layers_loss.order(*self.result(*given)).item()
 
     def test_order_of_depths(self):
         self.assertAlmostEqual(self.order([0, 1], [1.0, 2.0], [3, 3]), 0)
         self.assertAlmostEqual(self.order([1, 0], [1.0, 2.0], [3, 3]), 2, places=5)
         self.assertAlmostEqual(self.order([1, 1], [1.0, 2.0], [3, 3]), 1, places=5)
-        self.assertAlmostEqual(self.order([1, 0], [1.0, 2.0], [3, 4]), 0)  # of different pixels
+        self.assertAlmostEqual(self.order([1, 0], [2.0, 1.0], [3, 5]), 0)  # of neighbours
+        self.assertAlmostEqual(self.order([0, 1], [2.0, 1.0], [3, 5]), 2, places=5)
+        self.assertAlmostEqual(self.order([1, 0], [1.0, 2.0], [3, 12]), 0)  # too far apart
+        self.assertAlmostEqual(self.order([1, 0], [1.0, 2.0], [15, 16]), 0)  # of different rows
         self.assertAlmostEqual(self.order([0, 0], [1.0, 1.0], [3, 3]), 0)  # of one surface
+
+    def test_decision(self):
+        result, listed = self.result([0, 1], [1.0, 2.0], [3, 3])
+        self.assertAlmostEqual(layers_loss.undecided(result, listed).item(), 0, places=5)
+        even = result._replace(partition=torch.full((2, 2), 0.5))
+        self.assertAlmostEqual(layers_loss.undecided(even, listed).item(), 0.5, places=5)
 
 
 if __name__ == "__main__":
