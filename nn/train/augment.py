@@ -62,14 +62,19 @@ def streaks(random, height, width):
     return (result - result.mean()) / max(float(result.std()), 1e-6)
 
 
-def patterned(random, stack, targets):
-    """The crop with a pattern on its light, noisy and reference alike, so that the noise stays in proportion."""
-    relief = streaks(random, *stack.shape[1:])
+def drawn_pattern(random, height, width):
+    """A factor on light of a mean near 1, (height, width), its relief and contrast."""
+    relief = streaks(random, height, width)
     if random.random() < 0.5:  # in a part of the crop only
-        edge = random.standard_normal(2) @ np.mgrid[-1 : 1 : relief.shape[0] * 1j, -1 : 1 : relief.shape[1] * 1j].reshape(2, -1)
+        edge = random.standard_normal(2) @ np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j].reshape(2, -1)
         relief = relief * (edge.reshape(relief.shape) > 0)
     contrast = random.uniform(*CONTRAST)
-    pattern = np.exp(contrast * relief - 0.5 * contrast**2 * (relief != 0)).astype(np.float32)
+    return np.exp(contrast * relief - 0.5 * contrast**2 * (relief != 0)).astype(np.float32), relief, contrast
+
+
+def patterned(random, stack, targets):
+    """The crop with a pattern on its light, noisy and reference alike, so that the noise stays in proportion."""
+    pattern, relief, contrast = drawn_pattern(random, *stack.shape[1:])
     stack = stack.copy()
     for light in LIGHTS:
         for layer in (light, f"{light}.noise", f"{light}.root", f"{light}.halves"):
@@ -126,15 +131,17 @@ class Batches:
     def __init__(self, cache, size, seed):
         self.cache, self.size, self.seed = cache, size, seed
 
-    def batch(self, step, count):
-        """Planes, colours and references of `count` crops. Scenes are chosen by the root of how many frames they have."""
-        random = np.random.default_rng([self.seed, step])
+    def crops(self, random, count):
+        """Frames, and a crop of each. Scenes are chosen by the root of how many frames they have."""
         scenes = list(self.cache.scenes().values())
         shares = np.sqrt([len(scene) for scene in scenes])
-        parts = []
         for _ in range(count):
             scene = scenes[random.choice(len(scenes), p=shares / shares.sum())]
             frame = scene[random.integers(len(scene))]
-            stack, targets = frame.crop(*frame.corner(random, self.size), self.size)
-            parts.append(varied(random, stack, targets, frame.given, frame.exposure))
+            yield frame, *frame.crop(*frame.corner(random, self.size), self.size)
+
+    def batch(self, step, count):
+        """Planes, colours and references of `count` crops."""
+        random = np.random.default_rng([self.seed, step])
+        parts = [varied(random, stack, targets, frame.given, frame.exposure) for frame, stack, targets in self.crops(random, count)]
         return [np.stack(x) for x in zip(*parts)]

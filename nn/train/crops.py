@@ -80,10 +80,11 @@ class Frame:
         self.exposure, self.given = description["exposure"], frozenset(description["given"])
         self.acceptance = np.array(description["acceptance"], np.float32)
         self.pixels = np.load(path, mmap_mode="r")
+        self.sides = self.pixels.shape[1:]
 
     def corner(self, random, size):
         """Of a crop, by rejection."""
-        height, width = self.pixels.shape[1:]
+        height, width = self.sides
         for _ in range(TRIES):
             y, x = random.integers(height - size + 1), random.integers(width - size + 1)
             rows, columns = self.acceptance.shape
@@ -101,17 +102,21 @@ class Frame:
 class Cache:
     """All frames below `roots` that may be trained on, prepared once into `folder` for crops of `size` pixels."""
 
+    version, frame = VERSION, Frame
+
     def __init__(self, folder, roots, size, share=0.0, log=print):
         self.folder, self.roots, self.size, self.share, self.log = Path(folder), roots, size, share, log
         self.frames, self.refused = [], {}
         self.folder.mkdir(parents=True, exist_ok=True)
 
+    def pairs(self):
+        """What may be trained on."""
+        return [pair for pair in frames.find(self.roots) if not frames.held_out(pair.scene, self.share)]
+
     def refresh(self):
         """Takes in what has been rendered since; a frame that cannot be read (yet) is tried again when it changes."""
         known = {frame.key for frame in self.frames}
-        for pair in frames.find(self.roots):
-            if frames.held_out(pair.scene, self.share):
-                continue
+        for pair in self.pairs():
             key = self.key(pair)
             if key in known or key in self.refused:
                 continue
@@ -128,16 +133,19 @@ class Cache:
 
     def key(self, pair):
         stamps = [(file.stat().st_size, file.stat().st_mtime_ns) for file in (pair.noisy, pair.reference)]
-        return hashlib.sha256(repr((VERSION, self.size, pair.scene, pair.name, stamps)).encode()).hexdigest()[:24]
+        return hashlib.sha256(repr((self.version, self.size, pair.scene, pair.name, stamps)).encode()).hexdigest()[:24]
 
     def open(self, key, pair):
         path = self.folder / f"{key}.npy"
         described = path.with_suffix(".json")
         if not described.exists():
-            pixels, description = prepare(pair, self.size)
+            pixels, description = self.prepare(pair)
             replace(path, lambda file: np.save(file, pixels))
             replace(described, lambda file: file.write(json.dumps(description).encode()))
-        return Frame(path, json.loads(described.read_text()))
+        return self.frame(path, json.loads(described.read_text()))
+
+    def prepare(self, pair):
+        return prepare(pair, self.size)
 
     def scenes(self):
         result = {}

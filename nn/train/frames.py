@@ -1,6 +1,6 @@
 """Finds noisy frames and their references, and reads them.
 
-A reference X.ref.exr belongs with every X.flat.exr and X.<spp>.flat.exr beside it. The scene is the folder's name, or X
+A reference X.ref.exr belongs with every X.flat.exr and X.<spp>.flat.exr beside it, and with X.samples.exr and X.<spp>.samples.exr. The scene is the folder's name, or X
 where that folder is the root of the data. Channels are named as in the project's convention (docs/channels.md).
 """
 
@@ -15,22 +15,22 @@ HELD_OUT = ("fur", "coffee", "living-room")
 
 Pair = namedtuple("Pair", "noisy reference scene name")
 
-NOISY, REFERENCE = ".flat.exr", ".ref.exr"
+NOISY, SAMPLES, REFERENCE = ".flat.exr", ".samples.exr", ".ref.exr"
 
 
-def find(roots):
-    """All pairs below the folders, in the order of their names. A pair is named by its path below its root."""
+def find(roots, kind=NOISY):
+    """All pairs below the folders, in the order of their names, of flat frames or of samples. A pair is named by its path below its root."""
     pairs = []
     for root in map(Path, roots):
-        for noisy in sorted(root.rglob("*" + NOISY)):
-            view = noisy.name[: -len(NOISY)]
+        for noisy in sorted(root.rglob("*" + kind)):
+            view = noisy.name[: -len(kind)]
             head, _, last = view.rpartition(".")
             views = [view] + ([head] if last.isdigit() else [])
             for x in views:
                 reference = noisy.with_name(x + REFERENCE)
                 if reference.exists():
                     scene = x if noisy.parent == root else noisy.parent.name
-                    name = str(noisy.relative_to(root))[: -len(NOISY)]
+                    name = str(noisy.relative_to(root))[: -len(kind)]
                     pairs.append(Pair(noisy, reference, scene, name))
                     break
     return pairs

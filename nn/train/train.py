@@ -37,8 +37,8 @@ FIXED = ("width", "batch", "crop", "seed")  # cannot change when a training goes
 COLUMNS = ("step", "hours", "frames", "loss", "frame", "components", "smape", "relmse")
 
 
-def options(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def options(arguments=None, words=__doc__):
+    parser = argparse.ArgumentParser(description=words, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", nargs="+", type=Path, required=True, help="folders with frames and references")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--width", type=int, default=16)
@@ -49,17 +49,24 @@ def options(arguments=None):
     parser.add_argument("--crop", type=int, default=128, help="side, a multiple of 4")
     parser.add_argument("--rate", type=float, default=1e-3, help="of Adam, after the start")
     parser.add_argument("--warmup", type=int, default=300, help="steps in which the rate rises")
-    parser.add_argument("--settle", type=int, default=600, help="steps that keep the masks uniform")
+    parser.add_argument("--settle", type=int, default=600, help="steps that keep the masks uniform, or layers apart")
     parser.add_argument("--validate", type=int, default=1000, help="steps between two validations")
     parser.add_argument("--share", type=float, default=0.0, help="of the other scenes that are kept for validation")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=5, help="between two checkpoints")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
     parser.add_argument("--bfloat16", action="store_true", help="convolutions in bfloat16, on processors that have it")
-    return parser.parse_args(arguments)
+    settings = parser.parse_args(arguments)
+    if settings.batch % 4 or settings.crop % 4:
+        raise SystemExit("train.py: --batch and --crop: expected multiples of 4")
+    return settings
 
 
 class Training:
+    """What makes and trains the compositional denoiser; another network overrides what is its own."""
+
+    columns = COLUMNS
+
     def __init__(self, settings):
         self.settings = settings
         settings.out.mkdir(parents=True, exist_ok=True)
@@ -68,15 +75,22 @@ class Training:
         self.average = copy.deepcopy(self.model)
         self.optimizer = torch.optim.Adam(self.model.parameters(), settings.rate)
         self.step, self.hours, self.losses = 0, 0.0, []
-        self.cache = Cache(settings.out / "cache", settings.data, settings.crop, settings.share)
-        self.batches = Batches(self.cache, settings.crop, settings.seed)
+        self.cache, self.batches = self.frames_and_batches()
         self.cache.refresh()
         if self.checkpoint.exists():
             self.resume()
         if not self.cache.frames:
             raise SystemExit("train.py: no frames to train on: " + ", ".join(map(str, settings.data)))
-        kept = [pair for pair in frames.find(settings.data) if frames.held_out(pair.scene, settings.share)]
-        self.subjects = [evaluate.subject(pair) for pair in kept]
+        self.subjects = self.held_out()
+
+    def frames_and_batches(self):
+        settings = self.settings
+        cache = Cache(settings.out / "cache", settings.data, settings.crop, settings.share)
+        return cache, Batches(cache, settings.crop, settings.seed)
+
+    def held_out(self):
+        kept = [pair for pair in frames.find(self.settings.data) if frames.held_out(pair.scene, self.settings.share)]
+        return [evaluate.subject(pair) for pair in kept]
 
     def first_model(self):
         settings = self.settings
@@ -113,29 +127,39 @@ class Training:
             state[name] = getattr(self, name).state_dict()
         replace(self.checkpoint, lambda file: torch.save(state, file))
 
-    def components(self):
+    def drawn(self, shares):
+        """One of {choice: its share}, of this step."""
         random = np.random.default_rng([self.settings.seed, self.step, 1])
-        return int(random.choice(list(SHARES), p=list(SHARES.values())))
+        return int(random.choice(list(shares), p=list(shares.values())))
 
-    def train_step(self):
-        """One step; the number of gigaflops that it took."""
-        settings, k = self.settings, self.components()
+    def autocast(self):
+        return torch.autocast("cpu", torch.bfloat16, enabled=self.settings.bfloat16)
+
+    def losses_of_step(self):
+        """The error, what is to be minimised, and the gigaflops that it takes."""
+        settings, k = self.settings, self.drawn(SHARES)
         count = settings.batch // k
         inputs, colours, references = map(torch.from_numpy, self.batches.batch(self.step, count))
         inputs = inputs.contiguous(memory_format=torch.channels_last)
+        with self.autocast():
+            result = self.model.result(inputs, colours, k)
+        work = 3e-6 * gigaflops_per_megapixel(settings.width, k) * count * settings.crop**2
+        return *loss(result, references, self.step < settings.settle), work
+
+    def train_step(self):
+        """One step; the number of gigaflops that it took."""
+        settings = self.settings
         for group in self.optimizer.param_groups:
             group["lr"] = settings.rate * schedule(self.step, settings.steps, settings.warmup)
-        with torch.autocast("cpu", torch.bfloat16, enabled=settings.bfloat16):
-            result = self.model.result(inputs, colours, k)
-        error, total = loss(result, references, self.step < settings.settle)
-        self.optimizer.zero_grad()
+        error, total, work = self.losses_of_step()
+        self.optimizer.zero_grad(set_to_none=True)  # what a step does not use, it does not move, whether there was a step before or not
         total.backward()
         torch.nn.utils.clip_grad_norm_(self.model.parameters(), LARGEST_GRADIENT)
         self.optimizer.step()
         self.move_average()
         self.losses.append(float(error))
         self.step += 1
-        return 3e-6 * gigaflops_per_megapixel(settings.width, k) * count * settings.crop**2
+        return work
 
     def move_average(self):
         keep = min(AVERAGE, (1 + self.step) / (10 + self.step))
@@ -148,23 +172,24 @@ class Training:
         row = {"step": self.step, "hours": f"{self.hours:.4f}", "frames": len(self.cache.frames)}
         row["loss"] = f"{np.mean(self.losses):.5f}"
         self.losses.clear()
-        rows = []
-        for frame in self.subjects:
-            for k in COMPONENTS:
-                image = evaluate.denoise(self.average, frame, k)
-                figures = {"smape": evaluate.smape(image, frame), "relmse": evaluate.relmse(image, frame)}
-                rows.append({**row, "frame": frame.name, "components": k, **{x: f"{y:.6f}" for x, y in figures.items()}})
+        rows = [{**row, "frame": frame.name, **figures} for frame in self.subjects for figures in self.figures(frame)]
         self.write_rows(rows or [row])
         print(f"step {self.step}, {self.hours:.2f} hours, {row['frames']} frames, loss {row['loss']}")
+        places = [name for name in self.columns[self.columns.index("frame") + 1 :] if name not in ("smape", "relmse")]
+        for place in dict.fromkeys(tuple(x[name] for name in places) for x in rows):
+            errors = [x["relmse"] for x in rows if tuple(x[name] for name in places) == place]
+            print("  " + ", ".join(f"{name} {x}" for name, x in zip(places, place)) + ": relMSE " + " ".join(errors), flush=True)
+
+    def figures(self, frame):
+        """Rows of the log of a held-out frame."""
         for k in COMPONENTS:
-            errors = [float(x["relmse"]) for x in rows if x["components"] == k]
-            print(f"  K = {k}: relMSE " + " ".join(f"{x:.5f}" for x in errors), flush=True)
+            yield {"components": k, **measured(evaluate.denoise(self.average, frame, k), frame)}
 
     def write_rows(self, rows):
         path = self.settings.out / "log.csv"
         fresh = not path.exists()
         with open(path, "a", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            writer = csv.DictWriter(file, self.columns, lineterminator="\n")
             if fresh:
                 writer.writeheader()
             writer.writerows(rows)
@@ -200,10 +225,12 @@ class Training:
         self.save()
 
 
+def measured(image, frame):
+    return {"smape": f"{evaluate.smape(image, frame):.6f}", "relmse": f"{evaluate.relmse(image, frame):.6f}"}
+
+
 def main(arguments=None):
     settings = options(arguments)
-    if settings.batch % 4 or settings.crop % 4:
-        raise SystemExit("train.py: --batch and --crop: expected multiples of 4")
     torch.set_num_threads(settings.threads)
     Training(settings).run()
 

@@ -25,7 +25,7 @@ class Look:
 
 
 def paths(scene, camera, look, spp, seed):
-    """spp consecutive camera paths per pixel, row by row: the 13 values of GROUPS and Z, and whether each hit.
+    """spp consecutive camera paths per pixel, row by row: the 13 values of GROUPS and Z, two of the lens, and whether each hit.
 
     Light is exposed and clamped. Every caller gets all of it, evaluated: one kernel per scene.
     """
@@ -35,19 +35,20 @@ def paths(scene, camera, look, spp, seed):
     index = dr.arange(mi.UInt32, n) // dr.opaque(mi.UInt32, spp)
     width = dr.opaque(mi.UInt32, camera.width)
     pixel = mi.Point2f(mi.Float(index % width), mi.Float(index // width)) + sampler.next_2d()
-    p = trace(scene, sampler, camera.rays(pixel, sampler.next_2d()), dr.opaque(mi.UInt32, look.depth), opaque(look.background))
+    lens = sampler.next_2d()
+    p = trace(scene, sampler, camera.rays(pixel, lens), dr.opaque(mi.UInt32, look.depth), opaque(look.background))
     top = dr.max(p.diffuse + p.specular)
     s = dr.minimum(opaque(look.exposure), opaque(look.clamp) / dr.maximum(top, 1e-12))
     light = [dr.select(dr.isfinite(top), v * s, 0) for v in (*p.diffuse, *p.specular)]
     z = camera.depth(p.position)
     hit = p.hit & (z > 1e-4)
-    values = light + [*p.albedo, *p.normal, dr.select(hit, z, 0)]
+    values = light + [*p.albedo, *p.normal, dr.select(hit, z, 0), lens.x, lens.y]
     dr.eval(values, hit)
     return values, hit
 
 
 def samples(scene, camera, look, spp, seed):
-    """(pixels, spp, 13) of GROUPS and Z, and (pixels, spp) whether each hit."""
+    """(pixels, spp, 15) of GROUPS, Z and the lens, and (pixels, spp) whether each hit."""
     values, hits = [], []
     pixels = camera.width * camera.height
     done = 0
@@ -101,7 +102,7 @@ def reference(scene, camera, look, spp, seed, enough=0.0):
     while done < spp:
         values, hit = paths(scene, camera, look, step, seed + done)
         light = values[:6] + [values[k] + values[k + 3] for k in range(3)]
-        v = light + values[6:] + [dr.select(hit, mi.Float(1), 0)]
+        v = light + values[6:13] + [dr.select(hit, mi.Float(1), 0)]
         total = lambda xs: np.stack([np.array(dr.block_reduce(dr.ReduceOp.Add, x, step), np.float64) for x in xs], axis=1)
         sums, squares, done = sums + total(v), squares + total([x * x for x in light]), done + step
         mean = sums / done
@@ -120,8 +121,14 @@ def write(path, camera, spp, channels):
     kind = lambda name: np.float32 if name in 'RGBAZ' or name.startswith('variance') else np.float16
     shape = camera.height, camera.width
     planes = {n: np.ascontiguousarray(c.reshape(shape).astype(kind(n))) for n, c in channels.items()}
-    header = {'compression': OpenEXR.ZIP_COMPRESSION, 'type': OpenEXR.scanlineimage, 'fathom:spp': spp,
-              'fathom:ppuScale': camera.scale, 'worldToCamera': camera.world_to_camera(), 'Software': f'Mitsuba {mi.__version__}'}
+    put(path, {'compression': OpenEXR.ZIP_COMPRESSION, 'type': OpenEXR.scanlineimage} | attributes(camera, spp), planes)
+
+
+def attributes(camera, spp):
+    return {'fathom:spp': spp, 'fathom:ppuScale': camera.scale, 'worldToCamera': camera.world_to_camera(), 'Software': f'Mitsuba {mi.__version__}'}
+
+
+def put(path, header, planes):
     beside = f'{path}.{os.getpid()}.part'
     OpenEXR.File(header, planes).write(beside)
     os.replace(beside, path)

@@ -1,10 +1,12 @@
-"""One job: a scene and some views of it, each a reference and two noisy frames. All follows from the job's index."""
+"""One job: a scene and some views of it, each a reference, two noisy frames and a file of samples. All follows from the job's index."""
 import glob
 import os
 import time
 
 import numpy as np
+import OpenEXR
 
+import deep
 import frames
 import random_scene
 import shared_scene
@@ -12,6 +14,7 @@ from camera import Camera
 
 SIZES = ((192, 144), (160, 160), (144, 192), (208, 128), (176, 152))
 SPP = {2: 0.15, 4: 0.2, 8: 0.2, 16: 0.2, 32: 0.15, 64: 0.1}  # of the noisy frames, and how often
+SAMPLES = 8  # camera samples per pixel that are kept one by one
 VIEWS = 3
 
 
@@ -19,9 +22,12 @@ class Unusable(Exception):
     """A scene or view that is not worth rendering; says why."""
 
 
-def scene_of(index, scenes, hdri):
-    """(name, scene, camera proposals): two random scenes, then one of the made ones."""
+def scene_of(index, scenes, hdri, kind=''):
+    """(scene, camera proposals): two random scenes, then one of the made ones; of one kind, random ones alone."""
     rng = np.random.default_rng([7, index])
+    if kind:
+        scene, cameras, _ = random_scene.build(rng, sorted(glob.glob(os.path.join(hdri, '*.hdr'))), kind)
+        return scene, cameras
     if index % 3 < 2 or not scenes:
         scene, cameras, kind = random_scene.build(rng, sorted(glob.glob(os.path.join(hdri, '*.hdr'))))
         return scene, cameras
@@ -30,8 +36,10 @@ def scene_of(index, scenes, hdri):
     return scene, shared_scene.Cameras(scene)
 
 
-def folder_of(index, scenes):
+def folder_of(index, scenes, kind=''):
     """The folder is the scene, by which training splits."""
+    if kind:
+        return f'{kind}.{index:05}'
     return f'random.{index:05}' if index % 3 < 2 or not scenes else os.path.basename(scenes[index // 3 % len(scenes)])
 
 
@@ -69,33 +77,54 @@ def compose(rng, scene, cameras):
     return camera, look
 
 
+def same_camera(path, camera):
+    """Whether an image was seen by this camera."""
+    header = OpenEXR.File(path, header_only=True).header()
+    return np.allclose(header['worldToCamera'], camera.world_to_camera(), 1e-4, 1e-4) and np.isclose(header['fathom:ppuScale'], camera.scale)
+
+
+def complete(path, only_samples):
+    return os.path.exists(f'{path}.{SAMPLES}.samples.exr') and (only_samples or os.path.exists(path + '.ref.exr'))
+
+
 def view(rng, scene, cameras, path):
-    """Write path.ref.exr, last, and two path.SPP.flat.exr."""
+    """Write what is not there of path.SPP.samples.exr, two path.SPP.flat.exr and, last, path.ref.exr."""
     start = time.time()
     camera, look = compose(rng, scene, cameras)
     counts = rng.choice(list(SPP), 2, replace=False, p=list(SPP.values()))
     seed = int(rng.integers(1 << 30))
-    channels, spp = frames.reference(scene, camera, look, 256, seed, enough=0.003)
-    light = (channels['R'] + channels['G'] + channels['B']) / 3
-    dark = (light < 0.002).mean()
-    if channels['A'].mean() < 0.3 or dark > 0.7:
-        raise Unusable(f'{1 - channels["A"].mean():.2f} of it is empty, {dark:.2f} dark')
-    for k, count in enumerate(counts):
-        frames.write(f'{path}.{count}.flat.exr', camera, int(count), frames.noisy(scene, camera, look, int(count), seed + 1000 * (k + 1)))
-    frames.write(f'{path}.ref.exr', camera, spp, channels)
-    print(f'{path}: {camera.width}x{camera.height}, noisy {counts[0]} and {counts[1]}, reference {spp}, {time.time() - start:.1f} s', flush=True)
+    reference, samples, made = path + '.ref.exr', f'{path}.{SAMPLES}.samples.exr', []
+    if os.path.exists(reference):
+        if not same_camera(reference, camera):
+            raise Unusable('its reference has another camera')
+    else:
+        channels, spp = frames.reference(scene, camera, look, 256, seed, enough=0.003)
+        light = (channels['R'] + channels['G'] + channels['B']) / 3
+        dark = (light < 0.002).mean()
+        if channels['A'].mean() < 0.3 or dark > 0.7:
+            raise Unusable(f'{1 - channels["A"].mean():.2f} of it is empty, {dark:.2f} dark')
+        for k, count in enumerate(counts):
+            frames.write(f'{path}.{count}.flat.exr', camera, int(count), frames.noisy(scene, camera, look, int(count), seed + 1000 * (k + 1)))
+        made = [f'noisy {counts[0]} and {counts[1]}', f'reference {spp}']
+    if not os.path.exists(samples):
+        deep.write(samples, camera, *frames.samples(scene, camera, look, SAMPLES, seed + 5000))
+        made = [f'samples {SAMPLES}', *made]
+    if not os.path.exists(reference):
+        frames.write(reference, camera, spp, channels)
+    print(f'{path}: {camera.width}x{camera.height}, {", ".join(made)}, {time.time() - start:.1f} s', flush=True)
 
 
-def run(index, out, scenes, hdri):
-    folder = os.path.join(out, folder_of(index, scenes))
+def run(index, out, scenes, hdri, kind='', only_samples=False):
+    """All views of a job; with `only_samples` the samples alone, of views that have a reference."""
+    folder = os.path.join(out, folder_of(index, scenes, kind))
     paths = [os.path.join(folder, f'{index:05}-{k}') for k in range(VIEWS)]
-    if all(os.path.exists(p + '.ref.exr') for p in paths):
+    wanted = [k for k, p in enumerate(paths) if not complete(p, only_samples) and (not only_samples or os.path.exists(p + '.ref.exr'))]
+    if not wanted:
         return
-    scene, cameras = scene_of(index, scenes, hdri)
+    scene, cameras = scene_of(index, scenes, hdri, kind)
     os.makedirs(folder, exist_ok=True)
-    for k, path in enumerate(paths):
-        if not os.path.exists(path + '.ref.exr'):
-            try:
-                view(np.random.default_rng([11, index, k]), scene, cameras, path)
-            except Unusable as why:
-                print(f'{path}: skipped: {why}', flush=True)
+    for k in wanted:
+        try:
+            view(np.random.default_rng([11, index, k]), scene, cameras, paths[k])
+        except Unusable as why:
+            print(f'{paths[k]}: skipped: {why}', flush=True)

@@ -166,8 +166,38 @@ def clutter(rng, hdris):
     return stage
 
 
-def build(rng, hdris):
-    """(scene, camera proposals of a generator, name of its kind)"""
-    kind = (outdoors, studio, room, clutter)[rng.choice(4, p=[0.24, 0.28, 0.32, 0.16])]
+def veil(rng, hdris):
+    """Hair, leaves, bars or wires close to the camera, and a scene far behind them."""
+    stage = (outdoors, studio, clutter)[rng.integers(3)](rng, hdris)
+    middle = np.mean(stage.targets, axis=0)
+    palette = shared_materials(rng, int(rng.integers(2, 5)))
+    kinds = [meshes.tuft, meshes.tuft, meshes.cards, meshes.fence, meshes.wire]
+    ring = stage.radius * rng.uniform(2.0, 3.0)  # cameras stand outside of it, objects inside
+    stage.radius = 0.5 * ring
+    stage.targets = [middle + rng.normal(size=3) * 0.3 * ring]
+    for _ in range(int(rng.integers(40, 90))):
+        a, size = rng.uniform(0, 2 * np.pi), np.exp(rng.uniform(np.log(0.3), np.log(1.2)))
+        at = middle + ring * rng.uniform(0.8, 1.1) * np.array([np.cos(a), np.sin(a), 0])
+        at[2] = rng.uniform(0.1, 0.6) * ring
+        mesh = kinds[rng.integers(len(kinds))](rng).moved(size, meshes.rotation(rng), at)
+        stage.put(mesh, palette[rng.integers(len(palette))])
+    low, high = 1.2 * ring, 1.7 * ring
+
+    def camera(rng):
+        target = middle + rng.normal(size=3) * 0.15 * ring
+        a, distance = rng.uniform(0, 2 * np.pi), rng.uniform(low, high)
+        origin = middle + np.array([distance * np.cos(a), distance * np.sin(a), rng.uniform(0.15, 0.6) * ring])
+        return origin, target, np.array([rng.normal() * 0.05, rng.normal() * 0.05, 1.0]), rng.uniform(25, 55)
+
+    stage.camera = camera
+    return stage
+
+
+KINDS = {f.__name__: f for f in (outdoors, studio, room, clutter, veil)}
+
+
+def build(rng, hdris, kind=''):
+    """(scene, camera proposals of a generator, name of its kind), of a kind of KINDS; drawn without."""
+    kind = KINDS[kind] if kind else (outdoors, studio, room, clutter)[rng.choice(4, p=[0.24, 0.28, 0.32, 0.16])]
     stage = kind(rng, hdris)
     return mi.load_dict({'type': 'scene', **stage.parts}), stage.camera, kind.__name__

@@ -17,6 +17,7 @@ import numpy as np
 import OpenEXR
 
 mi.set_variant('llvm_ad_rgb')
+import deep
 import frames
 import job
 import meshes
@@ -110,6 +111,31 @@ class Frames(unittest.TestCase):
         self.assertLessEqual(c['R'].max(), self.look.clamp * 1.001)
 
 
+class Samples(unittest.TestCase):
+    def test_samples_flatten_to_the_mean_of_all_paths_and_depths_ascend(self):
+        rng = np.random.default_rng(1)
+        v, camera = rng.random((8, 15)), Camera((0, 0, 0), (0, 1, 0), (0, 0, 1), 40, 16, 12, focus=1.5, blur=6)
+        v[:, 12] = [3, 2, 2, 2, 5, 0, 4, 0]
+        hit = v[:, 12] > 0
+        out = deep.pixel(v[hit], 8, camera)
+        self.assertTrue((np.diff(out['Z']) > 0).all())
+        np.testing.assert_allclose(out['Z'], [2, 2, 2, 3, 4, 5], rtol=1e-6)
+        np.testing.assert_allclose(out['coc'], 6 * np.abs(1 - 1.5 / out['Z']), rtol=1e-3)
+        passed = np.cumprod(1 - np.append(0, out['A'][:-1]))
+        np.testing.assert_allclose(passed * out['A'], 1 / 8, rtol=1e-6)
+        for k, name in enumerate(('diffuse.R', 'diffuse.G', 'diffuse.B', 'specular.R')):
+            self.assertAlmostEqual((passed * out[name]).sum(), v[hit, k].sum() / 8, places=3)
+        self.assertAlmostEqual((passed * out['B']).sum(), (v[hit, 2] + v[hit, 5]).sum() / 8, places=3)
+        self.assertEqual(len(deep.pixel(v[:0], 8, camera)['Z']), 0)
+
+    def test_samples_of_a_view_agree_with_its_reference(self):
+        scene, camera = ball({'type': 'twosided', 'nested': grey(0.6)})
+        v, hit = frames.samples(scene, camera, frames.Look(), 8, 5)
+        self.assertEqual(v.shape, (16 * 12, 8, 15))
+        self.assertAlmostEqual((v[..., 0] + v[..., 3]).mean(), 0.3, delta=0.01)
+        self.assertTrue((v[..., 13:] >= 0).all() and (v[..., 13:] < 1).all() and hit.all())
+
+
 class Batches(unittest.TestCase):
     def test_a_job_is_repeatable_and_not_done_twice(self):
         job.SIZES, job.SPP, job.VIEWS = ((64, 64),), {2: 0.5, 4: 0.5}, 1
@@ -117,14 +143,22 @@ class Batches(unittest.TestCase):
             for folder in (a, b):
                 job.run(0, folder, [], '')
             names = sorted(os.listdir(os.path.join(a, 'random.00000')))
-            self.assertEqual(names, ['00000-0.2.flat.exr', '00000-0.4.flat.exr', '00000-0.ref.exr'])
-            read = lambda folder, n: {k: c.pixels for k, c in OpenEXR.File(os.path.join(folder, 'random.00000', n), separate_channels=True).channels().items()}
+            self.assertEqual(names, ['00000-0.2.flat.exr', '00000-0.4.flat.exr', '00000-0.8.samples.exr', '00000-0.ref.exr'])
+            flat = lambda x: np.concatenate([p for p in x.ravel() if p is not None]) if x.dtype == object else x
+            read = lambda folder, n: {k: flat(c.pixels) for k, c in OpenEXR.File(os.path.join(folder, 'random.00000', n), separate_channels=True).channels().items()}
             for n in names:
                 one, two = read(a, n), read(b, n)
                 self.assertTrue(all(np.array_equal(one[k], two[k]) for k in one | two))
             before = [os.stat(os.path.join(a, 'random.00000', n)).st_mtime_ns for n in names]
             job.run(0, a, [], '')
             self.assertEqual(before, [os.stat(os.path.join(a, 'random.00000', n)).st_mtime_ns for n in names])
+            samples = os.path.join(a, 'random.00000', names[2])
+            os.remove(samples)
+            job.run(0, a, [], '', only_samples=True)
+            one, two = read(a, names[2]), read(b, names[2])
+            self.assertTrue(all(np.array_equal(one[k], two[k]) for k in one | two))
+            job.run(1, a, [], '', only_samples=True)
+            self.assertFalse(os.path.exists(os.path.join(a, 'random.00001')))
 
     def test_a_broken_scene_is_skipped_with_a_line_and_held_out_ones_are_never_read(self):
         with tempfile.TemporaryDirectory() as folder:

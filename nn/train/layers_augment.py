@@ -1,0 +1,110 @@
+"""Variations of a crop of camera samples: how many of them, and in which form; exposure, flips, colours, patterns, missing features."""
+
+import numpy as np
+
+import augment
+from augment import PATTERNED, STOPS, TURNED, drawn_pattern
+from clusters import PHYSICAL, chosen, gathered, labels
+from layers_model import assembled
+from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, inputs, light_of
+
+# Raw camera samples; bins of them; all of a pixel in one, which is what a network on pixels sees.
+FORMS = {"samples": 0.5, "bins": 0.35, "pixels": 0.15}
+WANTED = {1.0: 0.45, 0.5: 0.3, 0.25: 0.25}  # share of the camera samples that are taken
+EXPONENTS, FIRSTS = (1.0, 1.5, 2.0, 3.0), (0, 1)  # of the clustering
+
+# How often a feature is taken away. Bins seldom know where on the lens their samples were.
+MISSING = {("albedo",): 0.1, ("normal",): 0.1, ("coc",): 0.25, ("lens",): 0.25, ("components",): 0.15, ("noise",): 0.2}
+BARE = 0.05  # share of crops with light and depth alone
+
+
+def formed(random, form, samples, spp, scale):
+    """The columns of samples.py, weights and pixels of a crop's (pixels, spp, PHYSICAL) samples."""
+    wanted = max(1, round(spp * random.choice(list(WANTED), p=list(WANTED.values()))))
+    counts = (samples[:, :, WHERE["depth"].start] > 0).sum(1)
+    samples, counts = chosen(random, samples, counts, spp, wanted)
+    if form == "samples":
+        there = np.arange(samples.shape[1]) < counts[:, None]
+        values = np.zeros((int(counts.sum()), WIDTH), np.float32)
+        values[:, :PHYSICAL], values[:, WHERE["count"]] = samples[there], 1
+        pixel = np.nonzero(there)[0]
+    else:
+        if form == "bins":
+            label = labels(samples[:, :, WHERE["depth"].start], counts, scale, random.choice(EXPONENTS), random.choice(FIRSTS))
+        else:
+            label = np.zeros(samples.shape[:2], np.int64)
+        values, pixel = gathered(samples, counts, label)
+    return values, values[:, WHERE["count"]][:, 0] / wanted, pixel
+
+
+def without(values, gone):
+    """A list that lacks some of its features, in place."""
+    if "components" in gone:
+        values[:, WHERE["specular"]] = light_of(values)
+        values[:, WHERE["diffuse"]] = 0
+        noise = values[:, WHERE["noise"]]
+        noise[:, 1] = np.sqrt((noise**2).sum(1))  # as if the components were independent
+        noise[:, 0] = 0
+    for name, unknown in (("albedo", UNKNOWN_ALBEDO), ("normal", 0), ("coc", 0), ("lens", 0), ("noise", 0)):
+        if name in gone:
+            values[:, WHERE[name]] = unknown
+
+
+def missing(random, given):
+    gone = {name for names, share in MISSING.items() if random.random() < share for name in names}
+    if random.random() < BARE:
+        gone.update(*MISSING)
+    return gone | (set(FEATURES) - given)
+
+
+def turned_lens(lens, flips, transposed):
+    """Places on the lens, (..., 2) in [0, 1), V upwards, with the picture upside down, left to right, then across the diagonal."""
+    u, v = lens[..., 0], lens[..., 1]
+    u, v = (1 - u if flips[1] else u), (1 - v if flips[0] else v)
+    return np.stack([1 - v, 1 - u] if transposed else [u, v], -1)
+
+
+def turned(random, samples, targets):
+    """Both, (height, width, ...), flipped or transposed, with normals, places on the lens and colours to fit."""
+    flips, transposed = random.random(2) < 0.5, random.random() < 0.5
+    axes, signs = augment.turned_normals(random, flips, transposed)
+    colours = random.permutation(3)
+    result = []
+    for x in (samples, targets):
+        x = x[:: -1 if flips[0] else 1, :: -1 if flips[1] else 1]
+        result.append((x.swapaxes(0, 1) if transposed else x).copy())
+    samples, targets = result
+    for name in ("diffuse", "specular", "albedo"):
+        samples[..., WHERE[name]] = samples[..., WHERE[name]][..., colours]
+    targets[..., :3] = targets[..., :3][..., colours]
+    samples[..., WHERE["normal"]] = samples[..., WHERE["normal"]][..., axes] * signs
+    samples[..., WHERE["lens"]] = turned_lens(samples[..., WHERE["lens"]], flips, transposed)
+    return samples, targets
+
+
+def varied(random, frame, samples, targets):
+    """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 5), light times the exposure."""
+    samples, targets = turned(random, samples, targets)
+    if random.random() < PATTERNED:
+        pattern = drawn_pattern(random, *targets.shape[:2])[0][:, :, None]
+        samples[..., :6] *= pattern[..., None]
+        targets[..., :3] *= pattern
+        if random.random() < augment.SHOWN["albedo"]:
+            albedo = samples[..., WHERE["albedo"]]
+            np.minimum(albedo * pattern[..., None], 1, out=albedo)
+    form = random.choice(list(FORMS), p=list(FORMS.values()))
+    values, weight, pixel = formed(random, form, samples.reshape(-1, *samples.shape[2:]), frame.spp, frame.scale)
+    without(values, missing(random, frame.given))
+    scale = frame.exposure * 2.0 ** random.uniform(-STOPS, STOPS)
+    targets[..., :3] = scale * np.maximum(targets[..., :3], 0)
+    z = values[:, WHERE["depth"]][:, 0]
+    return (inputs(values, weight, scale, frame.depth), weight, scale * light_of(values), z / frame.depth, pixel), targets
+
+
+class Batches(augment.Batches):
+    def batch(self, step, count):
+        """Samples of `count` crops, and their targets (count, 5, height, width)."""
+        random = np.random.default_rng([self.seed, step])
+        parts = [varied(random, *crop) for crop in self.crops(random, count)]
+        targets = np.stack([x for _, x in parts]).transpose(0, 3, 1, 2)
+        return assembled([x for x, _ in parts], (self.size, self.size)), np.ascontiguousarray(targets)

@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Trains the layered denoiser.
+
+    train_layers.py --data FOLDER... --out FOLDER [--width 32] [--steps 20000] ...
+
+As train.py, on files of samples, X.samples.exr or X.<spp>.samples.exr, and their references. The scenes fur, coffee and living-room, and the
+shared frame staircase2, are never trained on; --share holds back some of the others. With --start, weights or a checkpoint of a compositional
+denoiser of the same width, it begins with the U-net of that one's filter.
+
+Each step draws L from {1, 2, 4}. Batches are of the same size for all, since the layers are a small part of the work.
+"""
+
+import torch
+
+import evaluate_layers
+import frames
+import layers_crops
+import train
+from layers_augment import Batches
+from layers_loss import loss
+from layers_model import LAYERS, Layered, gigaflops_per_megapixel
+from weights import load_model
+
+SHARES = {1: 0.25, 2: 0.45, 4: 0.3}  # of the steps
+LOGGED = (*(("samples", k) for k in LAYERS), ("pixels", 1))  # form and layers
+
+
+class Training(train.Training):
+    columns = ("step", "hours", "frames", "loss", "frame", "form", "layers", "smape", "relmse")
+
+    def first_model(self):
+        settings = self.settings
+        model = Layered(settings.width)
+        if settings.start:
+            begun = load_model(settings.start).denoise
+            if begun.kernel0.in_channels != settings.width:
+                raise SystemExit(f"train_layers.py: {settings.start}: expected width {settings.width}, found {begun.kernel0.in_channels}")
+            known, taken = model.unet.state_dict(), begun.state_dict()
+            model.unet.load_state_dict({name: x if name.startswith("in.") else taken[name] for name, x in known.items()})
+        return model
+
+    def frames_and_batches(self):
+        settings = self.settings
+        cache = layers_crops.Cache(settings.out / "cache", settings.data, settings.crop, settings.share)
+        return cache, Batches(cache, settings.crop, settings.seed)
+
+    def held_out(self):
+        pairs = frames.find(self.settings.data, frames.SAMPLES)
+        forms = {form for form, _ in LOGGED}
+        return [evaluate_layers.subject(x, sorted(forms)) for x in pairs if layers_crops.held_out(x, self.settings.share)]
+
+    def losses_of_step(self):
+        settings, layers = self.settings, self.drawn(SHARES)
+        samples, targets = self.batches.batch(self.step, settings.batch)
+        with self.autocast():
+            result = self.model.result(samples, layers)
+        pixels = settings.batch * settings.crop**2
+        work = 3e-6 * gigaflops_per_megapixel(settings.width, layers, len(samples.pixel) / pixels) * pixels
+        return *loss(result, samples, torch.from_numpy(targets), min(1.0, self.step / max(1, settings.settle))), work
+
+    def figures(self, frame):
+        for form, layers in LOGGED:
+            image, _ = evaluate_layers.result_of(self.average, frame, form, layers)
+            yield {"form": form, "layers": layers, **train.measured(image, frame)}
+
+
+def main(arguments=None):
+    settings = train.options(arguments, __doc__)
+    torch.set_num_threads(settings.threads)
+    Training(settings).run()
+
+
+if __name__ == "__main__":
+    main()
