@@ -62,7 +62,7 @@ std::vector<NamedBase> basesOf(const ProgressiveRequest& request, const std::str
 std::string describeSettings(const ProgressiveRequest& request, const std::vector<NamedBase>& bases,
                              const std::string& mix, const SourceOptions& source) {
   std::string text =
-      fmt::format("progressive mix {} quality {} probes {} errors {} features {} halves {}", int(request.quality),
+      fmt::format("progressive mix {} quality {} probes {} errors {} features {} halves {}", mix, int(request.quality),
                   request.probes, request.errors, !request.features.empty(), request.halves.size());
   for (const NamedBase& base : bases) text += " base " + (base.common ? base.common->settings : base.name);
   if (source.map)

@@ -180,7 +180,9 @@ TEST(Progressive, CandidatesWeighByTheirErrorsInAnyOrder) {
     // The mean error less the candidates' spread about their mean, which here is beyond what independent errors leave.
     const double error = (0.01 + 0.02 / 4 + 0.04 / 16) / (21.0 / 16),
                  square = (0.16 + 0.25 / 4 + 0.36 / 16) / (21.0 / 16);
-    if (k[i] == 0) ASSERT_NEAR(one.get("error.G").values[i], error - (square - mean * mean), 1e-4);
+    if (k[i] == 0) {
+      ASSERT_NEAR(one.get("error.G").values[i], error - (square - mean * mean), 1e-4);
+    }
   }
 }
 
@@ -190,6 +192,7 @@ TEST(Progressive, ACandidateThatIsNotFiniteDoesNotCount) {
   std::vector<Candidate> some;
   some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
   some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
+  for (Candidate& candidate : some) candidate.k = gate(frame.noisy, noise, candidate.denoised);
   some[1].denoised.find("G")->values.fill(std::numeric_limits<float>::infinity());
   const Image two = mixCandidates(frame.noisy, noise, some);
   some.pop_back();
