@@ -16,7 +16,7 @@ namespace {
 
 constexpr float kTiny = 1e-30f;  // of errors
 constexpr float kPower = 2;      // of estimated errors in weights; nn/train/mix_model.py has the same
-constexpr float kMostOdds = 10;  // logarithm
+constexpr float kMostOdds = 2;   // logarithm: so that the share still falls with the noise, as equation 9 has it
 
 // How many times too small the variance that so many samples give may be; 1 where their number is not known.
 float doubt(float samples) {

@@ -18,7 +18,8 @@
 // - Several denoised images are first mixed with one another, by the inverse squares of their estimated errors (the
 //   inverses are best for errors that have nothing in common, which those of denoisers have), then with the render.
 // - A network (nn/mix) may correct both: the logarithms of the weights of denoised images, and of the odds of their
-//   mean against the render. The gate has the last word, so that the law of convergence holds whatever it says.
+//   mean against the render. The latter is bounded, and the gate has the last word, so that the law of convergence
+//   holds whatever it says: shares fall with the variance of the render by equation 9, times a constant at most.
 #pragma once
 
 #include <array>

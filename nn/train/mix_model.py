@@ -18,6 +18,7 @@ from model import convolution, doubled
 
 INPUTS = 2 * OWN + SHARED
 TINY = 1e-30
+MOST_ODDS = 2  # logarithm
 POWER = 2  # of estimated errors. The first is best where errors have nothing in common; denoisers err together
 
 
@@ -70,7 +71,7 @@ def mixed(logits, share, x, noise, samples, y, error, variance, covariance, gate
     mean_error = torch.maximum((weights * error).sum(1) - apart, (weights * weights * error).sum(1))
     doubt = torch.where(samples > 1, (samples + 11) / (samples - 1).clamp_min(1), torch.ones_like(samples))
     c = (weights * covariance).sum(1)
-    ours = (doubt * torch.maximum((weights * variance).sum(1), noise) - c).clamp_min(0) * share.exp()
+    ours = (doubt * torch.maximum((weights * variance).sum(1), noise) - c).clamp_min(0) * share.clamp(-MOST_ODDS, MOST_ODDS).exp()
     theirs = (mean_error - c).clamp_min(0)
     taken = torch.where(theirs > 0, ours / (ours + theirs).clamp_min(TINY), torch.ones_like(ours))
     taken = torch.minimum(taken, 1 - (weights * gate).sum(1) / doubt)

@@ -192,6 +192,7 @@ TEST(Progressive, ACandidateThatIsNotFiniteDoesNotCount) {
   std::vector<Candidate> some;
   some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
   some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
+  for (Candidate& candidate : some) candidate.k = gate(frame.noisy, noise, candidate.denoised);
   some[1].denoised.find("G")->values.fill(std::numeric_limits<float>::infinity());
   const Image two = mixCandidates(frame.noisy, noise, some);
   some.pop_back();
