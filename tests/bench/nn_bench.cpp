@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <ctime>
+#include <map>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -181,6 +182,9 @@ Table skipping() {
     made.emplace_back("right half converged", halfDone(noisy, false, false));
     made.emplace_back("upper half empty", halfDone(noisy, true, true));
     made.emplace_back("upper half converged", halfDone(noisy, false, true));
+    made.emplace_back("all converged", noisy.copy());
+    for (flat::Plane& plane : made.back().second.planes)
+      if (plane.name.starts_with("variance.")) std::fill(plane.values.begin(), plane.values.end(), 0.0f);
     return made;
   }();
   std::vector<std::vector<double>> seconds(frames.size());
@@ -203,12 +207,17 @@ Table skipping() {
 }  // namespace fathom::bench
 
 int main(int argc, char** argv) {
+  using namespace fathom::bench;
   try {
-    if (argc != 3) fathom::fail("usage: bench_nn FOLDER_OF_FRAMES OUTPUT_FOLDER");
-    const std::vector<fathom::bench::Table> tables = {fathom::bench::rates(), fathom::bench::costs(),
-                                                      fathom::bench::skipping()};
-    for (const fathom::bench::Table& table : tables) table.print();
-    fathom::bench::writeJson(std::string(argv[2]) + "/nn.json", tables);
+    const std::map<std::string, Table (*)()> all = {{"costs", costs}, {"rates", rates}, {"skipping", skipping}};
+    const std::string named = argc == 4 ? argv[3] : "";
+    if (argc < 3 || argc > 4 || (!named.empty() && !all.contains(named)))
+      fathom::fail("usage: bench_nn FOLDER_OF_FRAMES OUTPUT_FOLDER [rates|costs|skipping]");
+    std::vector<Table> tables;
+    for (const auto& [name, make] : all)
+      if (named.empty() || name == named) tables.push_back(make());
+    for (const Table& table : tables) table.print();
+    writeJson(std::string(argv[2]) + "/nn.json", tables);
   } catch (const std::exception& e) {
     fmt::print(stderr, "bench_nn: {}\n", e.what());
     return 1;

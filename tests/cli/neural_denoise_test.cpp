@@ -152,6 +152,21 @@ TEST_F(NeuralDenoise, GuidesDeepFrames) {
   EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end()));
 }
 
+// At --quality best, where Open Image Denoise is not found, the network has to promise more than our own filter.
+TEST_F(NeuralDenoise, CompetesToGuideTheBestDeepFrames) {
+  deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(40, 90, 1));
+  const Ran outcome = run("deep.exr -o auto.exr --quality best");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("bins are guided by"));
+  const std::string taken = outcome.err.find("guided by the network") != std::string::npos ? "neural" : "nlm";
+  ASSERT_EQ(run("deep.exr -o named.exr --quality best --flat-guide " + taken).status, 0);
+  EXPECT_EQ(bytes("auto.exr"), bytes("named.exr"));
+  std::filesystem::remove_all(folder_ / "models");
+  ASSERT_EQ(run("deep.exr -o alone.exr --quality best").status, 0);
+  ASSERT_EQ(run("deep.exr -o nlm.exr --quality best --flat-guide nlm").status, 0);
+  EXPECT_EQ(bytes("alone.exr"), bytes("nlm.exr"));
+}
+
 TEST_F(NeuralDenoise, AutoTakesOneOfThem) {
   const Ran outcome = run("in.exr -o auto.exr --method auto");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
