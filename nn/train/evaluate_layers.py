@@ -3,10 +3,11 @@
 
     evaluate_layers.py WEIGHTS FOLDER... [--frames fur staircase2] [--other NAME=FOLDER ...] [--out FOLDER]
 
-Prints two tables of relMSE (as evaluate.py has it): over all pixels, and over those that see two depths or more. Of each frame the camera
-samples, bins of them, and one bin per pixel (what a network on pixels sees) are denoised with 1, 2 and 4 layers. The frames are the
-held-out ones unless they are named. --other: results of another denoiser, FOLDER/FRAME.exr, compared in the same pixels. With --out, pictures
-of each: noisy, denoised, reference; and of the layers of two: light over black, light over grey, opacity, depth.
+Prints two tables of relMSE (as evaluate.py has it): over all pixels, and over those that see two depths or more; and a third of which samples
+the front one of two layers takes there. Of each frame the camera samples, bins of them, and one bin per pixel (what a network on pixels sees) are
+denoised with 1, 2 and 4 layers. The frames are the held-out ones unless they are named. --other: results of another denoiser, FOLDER/FRAME.exr,
+compared in the same pixels. With --out, pictures of each: noisy, denoised, reference; and of two and of four layers, front to back: light over
+black, light over grey, opacity, depth.
 """
 
 import argparse
@@ -63,13 +64,27 @@ def subject(pair, forms=FORMS):
     )  # fmt: skip
 
 
-def result_of(model, frame, form, layers):
-    """The denoised light (3, height, width), and the layers, front to back, in the frame's units."""
+def network_result(model, frame, form, layers):
     deep = frame.forms[form]
-    height, width = deep.shape
     parts = samples.listed(deep, frame.exposure, frame.depth)
     with torch.no_grad():
-        result = model.result(assembled([parts], samples.padded(deep.shape)), layers)
+        return model.result(assembled([parts], samples.padded(deep.shape)), layers)
+
+
+def fronts(model, frame):
+    """Of two layers, the front one's mean shares of the nearest and of the farthest sample, where a pixel sees two depths."""
+    deep = frame.forms["samples"]
+    front = network_result(model, frame, "samples", 2).partition[:, 0].numpy()
+    first = np.flatnonzero(np.diff(deep.pixel, prepend=-1))
+    last = np.append(first[1:], len(deep.pixel)) - 1
+    there = frame.several.ravel()[deep.pixel[first]]
+    return front[first][there].mean(), front[last][there].mean()
+
+
+def result_of(model, frame, form, layers):
+    """The denoised light (3, height, width), and the layers, front to back, in the frame's units."""
+    height, width = frame.forms[form].shape
+    result = network_result(model, frame, form, layers)
 
     def crop(x, scale=1.0):
         return x[..., :height, :width].numpy() / scale
@@ -141,7 +156,7 @@ def main(arguments=None):
     parser.add_argument("--out", type=Path)
     options = parser.parse_args(arguments)
     model = load_model(options.weights, Layered)
-    everywhere, there = [], []
+    everywhere, there, shares = [], [], []
     for pair in frames.find(options.folders, frames.SAMPLES):
         if not ({pair.name, pair.scene} & set(options.frames) if options.frames else layers_crops.held_out(pair, options.share)):
             continue
@@ -150,12 +165,15 @@ def main(arguments=None):
         everywhere.append((frame.name, {name: relmse(x, frame) for name, x in images.items()}))
         error = only(frame, frame.several)
         there.append((f"{frame.name} ({frame.several.mean():.2f})", {name: error(x) for name, x in images.items()}))
+        near, far = fronts(model, frame)
+        shares.append((frame.name, {"nearest sample": near, "farthest sample": far}))
         if options.out:
             write_pictures(options.out, frame, model)
     if not everywhere:
         raise SystemExit("evaluate_layers.py: no frames of samples")
     table("relMSE", everywhere)
     table(f"relMSE where a pixel sees depths of a ratio above {layers_crops.APART} (and the share of such pixels)", there)
+    table("The front one's share of a sample there, of two layers", shares)
 
 
 if __name__ == "__main__":

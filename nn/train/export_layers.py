@@ -3,7 +3,8 @@
 
     export_layers.py OUT WEIGHTS.safetensors [--data "words on the frames"]
 
-As export.py: OUT is the folder that train_layers.py wrote.
+As export.py: OUT is the folder that train_layers.py wrote. Beside the weights lie their card, WEIGHTS.md, and what it takes to go on: WEIGHTS.log.csv
+and WEIGHTS.training.pt, the log and the checkpoint of OUT.
 """
 
 import argparse
@@ -71,7 +72,8 @@ def main(arguments=None):
     save_model(options.weights, model, metadata)
     rows = last_rows(options.training / "log.csv", saved["step"])
     options.weights.with_suffix(".md").write_text(card(name, model, saved, rows, options.data))
-    shutil.copy(options.training / "log.csv", options.weights.with_suffix(".log.csv"))
+    for name in ("log.csv", "checkpoint.pt"):
+        shutil.copy(options.training / name, options.weights.with_suffix("." + name.replace("checkpoint", "training")))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import torch
 from loss import COARSE, LOGITS, SQUARED, mean_squares, relative_square, smape
 from model import half_size
 
-FEATURES = 3e-5  # as in loss.py; but at 1e-3 the features at half and quarter size died within 1000 steps
+FEATURES = 3e-5  # as in loss.py; but at 1e-3 the features at half and quarter size died within 1500 steps
 ALPHA = 0.5  # weight of the mean square error of alpha
 APART = (1.0, 0.1)  # weight of the order of depths: at first, and in the end
 GAP = 0.1  # a relative distance in depth from which on samples belong to different layers
