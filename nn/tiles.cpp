@@ -8,12 +8,13 @@
 #include <mutex>
 
 #include "base/parallel.h"
+#include "nn/tile_work.h"
 
 namespace fathom::nn {
 
 namespace {
 
-constexpr int kSmallest = 64, kFair = 256, kLargest = 512, kStep = 32;
+constexpr int kSmallest = 64, kFair = 256, kLargest = 512;
 constexpr double kTogether = 8;  // tiles that should fit into the memory at once, as long as they stay fair
 
 double bytesOfTile(const CompositionalNet& net, int side, int components) {
@@ -26,18 +27,9 @@ int tileSide(const CompositionalNet& net, int components, const TileParams& para
   const auto tooLarge = [&](double tiles) {
     return params.memory && tiles * bytesOfTile(net, side, components) > double(params.memory);
   };
-  while (side > kFair && tooLarge(kTogether)) side -= kStep;
-  while (side > kSmallest && tooLarge(1)) side -= kStep;
+  while (side > kFair && tooLarge(kTogether)) side -= kTileStep;
+  while (side > kSmallest && tooLarge(1)) side -= kTileStep;
   return side;
-}
-
-// Parts of about equal length, at most `most`, each but the last a multiple of kStep.
-std::vector<int> cuts(int length, int most) {
-  const int parts = (length + most - 1) / most;
-  const int part = parts ? ((length + parts - 1) / parts + kStep - 1) / kStep * kStep : 0;
-  std::vector<int> result = {0};
-  while (result.back() < length) result.push_back(std::min(result.back() + part, length));
-  return result;
 }
 
 // Workspaces, each used by one tile at a time.
@@ -60,33 +52,11 @@ class Workspaces {
   std::vector<std::unique_ptr<CompositionalNet::Workspace>> free_;
 };
 
-// Counts what is done, by arithmetic.
-class Done {
- public:
-  Done(double all, const Progress& progress) : all_(all), progress_(progress) {}
-
-  void add(double part) {
-    const std::lock_guard lock(guard_);
-    sum_ += part;
-    progress_.at(std::min(sum_ / all_, 1.0));
-  }
-
- private:
-  double all_, sum_ = 0;
-  const Progress& progress_;
-  std::mutex guard_;
-};
-
 }  // namespace
 
 std::vector<Window> tilesOf(const CompositionalNet& net, int height, int width, int mostComponents,
                             const TileParams& params) {
-  const int side = tileSide(net, mostComponents, params);
-  const std::vector<int> xs = cuts(width, side), ys = cuts(height, side);
-  std::vector<Window> tiles;
-  for (size_t j = 0; j + 1 < ys.size(); ++j)
-    for (size_t i = 0; i + 1 < xs.size(); ++i) tiles.push_back({xs[i], ys[j], xs[i + 1] - xs[i], ys[j + 1] - ys[j]});
-  return tiles;
+  return tilesOf(height, width, tileSide(net, mostComponents, params));
 }
 
 void denoiseTiles(const CompositionalNet& net, const CompositionalInput& frame, int mostComponents,
