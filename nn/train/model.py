@@ -56,7 +56,7 @@ class Input(nn.Module):
         self.colour = convolution(3, width, 3, bias=False)
 
     def forward(self, colour, features):
-        return functional.relu(self.features(features) + self.colour(torch.log1p(colour)))
+        return self.features(features) + self.colour(torch.log1p(colour))
 
 
 def doubled(x):
@@ -64,19 +64,19 @@ def doubled(x):
 
 
 class UNet(nn.Module):
-    """Three scales of w, 2w and 4w channels. `scales` gives all three, finest first."""
+    """Three scales of w, 2w and 4w channels, behind an entry that has w. `scales` gives all three, finest first."""
 
-    def __init__(self, width):
+    def __init__(self, width, entry):
         super().__init__()
         w = width
-        setattr(self, "in", Input(w))
+        setattr(self, "in", entry)
         self.level0, self.level1, self.level2 = Block(w), Block(2 * w), Block(4 * w)
         self.down0, self.down1 = convolution(w, 2 * w, 2, stride=2), convolution(2 * w, 4 * w, 2, stride=2)
         self.up1, self.merge1 = convolution(4 * w, 2 * w, 1), convolution(4 * w, 2 * w, 3)
         self.up0, self.merge0 = convolution(2 * w, w, 1), convolution(2 * w, w, 3)
 
-    def scales(self, colour, features):
-        x0 = self.level0(getattr(self, "in")(colour, features))
+    def scales(self, *inputs):
+        x0 = self.level0(functional.relu(getattr(self, "in")(*inputs)))
         x1 = self.level1(functional.relu(self.down0(x0)))
         x2 = self.level2(functional.relu(self.down1(x1)))
         y1 = functional.relu(self.merge1(torch.cat([doubled(self.up1(x2)), x1], 1)))
@@ -88,7 +88,7 @@ class Decompose(UNet):
     """Splits a component in two, each with features of its own."""
 
     def __init__(self, width):
-        super().__init__(width)
+        super().__init__(width, Input(width))
         self.mask = convolution(width, 3, 1)
         with torch.no_grad():
             self.mask.weight.mul_(0.1)  # begin with halves
@@ -157,7 +157,7 @@ class Denoise(UNet):
     """Filters one component with kernels of 5x5 at three scales."""
 
     def __init__(self, width):
-        super().__init__(width)
+        super().__init__(width, Input(width))
         self.kernel0 = convolution(width, TAPS + 1, 1)
         self.kernel1 = convolution(2 * width, TAPS + 1, 1)
         self.kernel2 = convolution(4 * width, TAPS, 1)

@@ -6,9 +6,15 @@ import struct
 import numpy as np
 import torch
 
-from model import INPUTS, Compositional
+import layers_model
+import model
 
-FORMAT, VERSION = "fathom-compositional", "1"
+# {model: format and further metadata} of a file.
+VERSION = "1"
+FORMATS = {
+    model.Compositional: {"format": "fathom-compositional", "inputs": str(model.INPUTS)},
+    layers_model.Layered: {"format": "fathom-layers", "inputs": str(layers_model.INPUTS), "embedding": str(layers_model.EMBEDDING)},
+}
 TYPES = {"F32": np.dtype("<f4")}
 ALIGNMENT = 8
 
@@ -46,22 +52,23 @@ def read_tensors(path):
     return tensors, metadata
 
 
-def save_model(path, model, metadata):
-    state = {name: tensor.detach().float().numpy() for name, tensor in model.state_dict().items()}
-    fixed = {"format": FORMAT, "version": VERSION, "width": str(model.width), "inputs": str(INPUTS)}
+def save_model(path, network, metadata):
+    state = {name: tensor.detach().float().numpy() for name, tensor in network.state_dict().items()}
+    fixed = {"version": VERSION, "width": str(network.width), **FORMATS[type(network)]}
     write_tensors(path, state, {**fixed, **metadata})
 
 
-def load_model(path):
+def load_model(path, kind=model.Compositional):
     """The model of a weight file or of a checkpoint, ready to denoise."""
     if str(path).endswith(".pt"):
         saved = torch.load(path, map_location="cpu")
         width, state = saved["width"], saved["average"]
     else:
         tensors, metadata = read_tensors(path)
-        if metadata.get("format") != FORMAT or metadata.get("version") != VERSION:
-            raise ValueError(f"{path}: expected {FORMAT} version {VERSION}, found {metadata}")
+        expected = {"version": VERSION, **FORMATS[kind]}
+        if any(metadata.get(name) != value for name, value in expected.items()):
+            raise ValueError(f"{path}: expected {expected}, found {metadata}")
         width, state = int(metadata["width"]), {name: torch.from_numpy(x) for name, x in tensors.items()}
-    model = Compositional(width)
-    model.load_state_dict(state)
-    return model.eval()
+    network = kind(width)
+    network.load_state_dict(state)
+    return network.eval()
