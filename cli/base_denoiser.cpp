@@ -60,16 +60,17 @@ void addBaseOptions(CLI::App& command, BaseOptions& options) {
   command
       .add_option("--method,--base", options.name,
                   "The denoiser of flat frames: Fathom's own filter, its network, or Open Image Denoise where it is "
-                  "installed; auto takes the one that promises the least error on the first frame")
-      ->type_name("nlm|neural|oidn|auto")
-      ->check(CLI::IsMember({kOwnBase, kNeuralBase, kOidnBase, kAutoBase}).description(""))
+                  "installed; auto takes the one that promises the least error on the first frame; layers is the "
+                  "network of deep frames, which reads their samples")
+      ->type_name("nlm|neural|oidn|layers|auto")
+      ->check(CLI::IsMember({kOwnBase, kNeuralBase, kOidnBase, kLayersBase, kAutoBase}).description(""))
       ->default_str(options.name);
   command
       .add_option(
           "--model", options.model,
           "The network's weights, of those that `fathom models` lists or in a file (default: base for --quality "
-          "best, else small)")
-      ->type_name("small|base|FILE");
+          "best, else small; layers for --method layers)")
+      ->type_name("small|base|layers|FILE");
   command
       .add_option_function<std::string>(
           "--components",
@@ -105,6 +106,7 @@ std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path) {
 }
 
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
+  if (options.name == kLayersBase) fail("--method {}: expected deep frames, found flat ones", kLayersBase);
   if (options.name != kOidnBase && options.name != kNeuralBase)
     return {.denoise = deep::flatNlMeans(plan), .settings = describeFilter(plan)};
   const bool oidn = options.name == kOidnBase;

@@ -29,17 +29,21 @@ ChunkReader::ChunkReader(DenoiseJob& job) : job_(job), halo_(deep::denoiseHalo(j
 
 std::optional<Chunk> ChunkReader::next() {
   const Stopwatch watch;
-  if (!source_ && frame_ == job_.frames.size()) return {};
+  if (!source_ && !layers_ && frame_ == job_.frames.size()) return {};
   Chunk chunk;
   chunk.frame = frame_;
   try {
-    if (!source_ && !open()) {
+    if (!source_ && !layers_ && !open()) {
       chunk.kept = true;
     } else {
       chunk.origin = origin_;
       chunk.guide = guide_;
       chunk.band = bands_[band_];
-      chunk.image = read(chunk.notes);
+      chunk.layers = layers_;
+      if (layers_)
+        chunk.notes = layers_->notes();
+      else
+        chunk.image = read(chunk.notes);
       chunk.last = ++band_ == bands_.size();
     }
   } catch (const std::exception&) {
@@ -59,7 +63,10 @@ bool ChunkReader::open() {
   for (const std::string& file : frame.inputs.files()) hash.addFile(file);
   const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
   if (isDone(frame.outputs, madeBy)) return false;
-
+  if (job_.plan.layers) {
+    openLayers(frame, madeBy);
+    return true;
+  }
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
   bands_ = planBands(*source_, job_.plan, halo_, job_.memory);
   if (bands_.size() > 1) job_.plan.firstImage.reset();
@@ -70,6 +77,19 @@ bool ChunkReader::open() {
                                                       source_->part().dataWindow, source_->flatAttributes(), madeBy,
                                                       job_.plan.record});
   return true;
+}
+
+void ChunkReader::openLayers(const DenoiseFrame& frame, const std::string& madeBy) {
+  layers_ = std::make_shared<LayersFrame>(*job_.plan.layers, frame.inputs, job_.source);
+  bands_ = layers_->bands();
+  const deep::PartInfo& part = layers_->source().part();
+  origin_ = std::make_shared<FrameOrigin>(FrameOrigin{.path = frame.inputs.main,
+                                                      .part = part.number,
+                                                      .dataWindow = part.dataWindow,
+                                                      .flatAttributes = {},
+                                                      .madeBy = madeBy,
+                                                      .record = {},
+                                                      .flattened = job_.plan.layers->output == LayersOutput::Flat});
 }
 
 bool ChunkReader::isDone(const FrameOutputs& outputs, const std::string& madeBy) const {
@@ -97,6 +117,7 @@ deep::DeepImage ChunkReader::read(std::set<std::string>& notes) {
 void ChunkReader::close() {
   source_.reset();
   guide_.reset();
+  layers_.reset();
   bands_.clear();
   band_ = 0;
   ++frame_;
