@@ -233,6 +233,7 @@ bool wantsLayers(const DenoiseRequest& request) {
   if (request.timeBudget) usage("--time-budget", "expected another method than layers, whose work is not measured");
   if (request.errors) usage("--error", "expected another method than layers, whose errors nothing tells");
   if (alone && request.split) usage("--split", "expected --as bins: layers have no components");
+  if (alone && request.params.keepStatistics) usage("--keep", "expected --as bins: what is left describes no bins");
   if (alone && request.guide != "auto") usage("--flat-guide", "expected --as bins: nothing else is guided");
   return true;
 }

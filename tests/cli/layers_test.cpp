@@ -209,6 +209,7 @@ TEST_F(LayersDenoise, WhatDoesNotGoIsOneLine) {
   expectLine("in.exr --time-budget 5", 2, "--time-budget");
   expectLine("in.exr --as layers --split", 2, "--split");
   expectLine("in.exr --as layers --flat-guide nlm", 2, "--flat-guide");
+  expectLine("in.exr --as layer-bins --keep", 2, "--keep");
   EXPECT_EQ(fathom("denoise in.exr -o out.exr --as layers").status, 2);
   deep::DeepImage noDepth = read("in.exr");
   noDepth.erase("B");
