@@ -75,22 +75,22 @@ void HalveGroupRow(const float* HWY_RESTRICT upper, const float* HWY_RESTRICT lo
 }
 
 // One row of logits to rows of weights, `stride` floats apart. `shares`: three rows, or null. Writes whole vectors.
-void WeightRow(const float* HWY_RESTRICT logits, size_t groupStride, size_t block, size_t width,
+void WeightRow(const float* HWY_RESTRICT logits, size_t groupStride, int block, size_t width,
                float* HWY_RESTRICT weights, size_t stride, float* const* shares) {
   const D d;
-  const size_t N = hn::Lanes(d), groups = 32 / block;
+  const size_t N = hn::Lanes(d), group = block == 8 ? 8 : 16, groups = 32 / group;
   const V most = hn::Set(d, 12.0f), least = hn::Set(d, -12.0f), one = hn::Set(d, 1.0f);
   HWY_ALIGN float planes[32 * hn::MaxLanes(d)];
   HWY_ALIGN float padded[16 * hn::MaxLanes(d)];
   for (size_t x = 0; x < width; x += N) {
     const size_t count = std::min(N, width - x);
     for (size_t g = 0; g < groups; ++g) {
-      const float* from = logits + g * groupStride + x * block;
+      const float* from = logits + g * groupStride + x * group;
       if (count < N) {
-        std::fill(std::copy_n(from, count * block, padded), padded + N * block, 0.0f);
+        std::fill(std::copy_n(from, count * group, padded), padded + N * group, 0.0f);
         from = padded;
       }
-      GroupToPlanes(d, from, int(block), planes + g * block * N);
+      GroupToPlanes(d, from, int(group), planes + g * group * N);
     }
     for (size_t k = 0; k < kKernelTaps; ++k)
       hn::StoreU(hn::Exp(d, hn::Clamp(hn::Load(d, planes + k * N), least, most)), d, weights + k * stride + x);
@@ -223,7 +223,7 @@ void splat(const float* logits, int block, const WidePlanes& values, WidePlanes&
       float* weights = ring[size_t(made % kRows)].data() + WidePlanes::kBorder;
       float* to[kLayerScales] = {};
       for (size_t i = 0; shares && i < kLayerScales; ++i) to[i] = shares->row(i, made);
-      weightRow(logits + size_t(made) * rowFloats, groupStride, size_t(block), size_t(width), weights, stride,
+      weightRow(logits + size_t(made) * rowFloats, groupStride, block, size_t(width), weights, stride,
                 shares ? to : nullptr);
       for (size_t k = 0; k < kKernelTaps; ++k)
         std::fill(weights + k * stride + width, weights + (k + 1) * stride - WidePlanes::kBorder, 0.0f);
