@@ -109,8 +109,9 @@ void addBaseOptions(CLI::App& command, BaseOptions& options) {
   const auto areNames = [](const std::string& text) {
     const std::vector<std::string> names = baseNames(text);
     for (const std::string& name : names) {
-      if (name != kOwnBase && name != kNeuralBase && name != kOidnBase && (name != kAutoBase || names.size() > 1))
-        return fmt::format("expected nlm, neural and oidn, or auto alone, found {}", name);
+      if (name != kOwnBase && name != kNeuralBase && name != kOidnBase &&
+          ((name != kAutoBase && name != kLayersBase) || names.size() > 1))
+        return fmt::format("expected nlm, neural and oidn, or auto or layers alone, found {}", name);
       if (std::ranges::count(names, name) > 1) return fmt::format("expected {} once", name);
     }
     return std::string();
@@ -119,16 +120,16 @@ void addBaseOptions(CLI::App& command, BaseOptions& options) {
       .add_option("--method,--base", options.name,
                   "The denoiser of flat frames: Fathom's own filter, its network, or Open Image Denoise where it is "
                   "installed; several (nlm,oidn) are mixed by their estimated errors; auto takes the one that promises "
-                  "the least error on the first frame")
-      ->type_name("nlm|neural|oidn|auto")
+                  "the least error on the first frame; layers is the network of deep frames, which reads their samples")
+      ->type_name("nlm|neural|oidn|layers|auto")
       ->check(CLI::Validator(areNames, ""))
       ->default_str(options.name);
   command
       .add_option(
           "--model", options.model,
           "The network's weights, of those that `fathom models` lists or in a file (default: base for --quality "
-          "best, else small)")
-      ->type_name("small|base|FILE");
+          "best, else small; layers for --method layers)")
+      ->type_name("small|base|layers|FILE");
   command
       .add_option_function<std::string>(
           "--components",
@@ -178,6 +179,7 @@ MixChoice mixOf(const BaseOptions& options) {
 }
 
 BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
+  if (options.name == kLayersBase) fail("--method {}: expected deep frames, found flat ones", kLayersBase);
   if (baseNames(options.name).size() > 1) return mixedBase(options, plan, scratch);
   if (options.name != kOidnBase && options.name != kNeuralBase)
     return {.denoise = deep::flatNlMeans(plan), .settings = describeFilter(plan)};

@@ -29,7 +29,8 @@ namespace fathom::cli {
 constexpr const char* kOwnBase = "nlm";
 constexpr const char* kOidnBase = "oidn";
 constexpr const char* kNeuralBase = "neural";
-constexpr const char* kAutoBase = "auto";  // one of the others: see cli/method_choice
+constexpr const char* kLayersBase = "layers";  // of deep frames alone: see cli/layers_frame
+constexpr const char* kAutoBase = "auto";      // one of the others: see cli/method_choice
 
 constexpr const char* kLearnedMix = "learned";
 constexpr const char* kFormulaMix = "formula";

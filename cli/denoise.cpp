@@ -63,6 +63,13 @@ deep::DenoiseParams paramsOf(const DenoiseCommand& command) {
   return {quality, !command.noGate, command.keep, filter};
 }
 
+LayersOutput outputNamed(const std::string& text) {
+  return text == "layer-bins" ? LayersOutput::LayerBins
+         : text == "layers"   ? LayersOutput::Layers
+         : text == "flat"     ? LayersOutput::Flat
+                              : LayersOutput::Bins;
+}
+
 // Frames that ought to be there and are not; true where that is a failure.
 bool reportMissing(const DenoiseCommand& command, const Sequence& sequence) {
   if (sequence.missing.empty()) return false;
@@ -74,6 +81,8 @@ bool reportMissing(const DenoiseCommand& command, const Sequence& sequence) {
 
 void runDenoise(const DenoiseCommand& command) {
   DenoiseRequest request = command.request;
+  if (request.layers.output != LayersOutput::Bins && request.base.name != kLayersBase)
+    usage("--as", fmt::format("expected --method layers with it, found {}", request.base.name));
   request.params = paramsOf(command);
   const Interrupt interrupt;
   const int threads = command.threads > 0 ? command.threads : int(std::max(1u, std::thread::hardware_concurrency()));
@@ -155,7 +164,17 @@ void addDenoise(CLI::App& app) {
       ->excludes(quality)
       ->excludes(filter);
   addBaseOptions(*sub, command->request.base);
-  option("--flat-guide", command->request.guide, "auto|nlm|neural|oidn|none|FILE",
+  option("--layers", command->request.layers.count, "1|2|4", "How many layers --method layers splits a frame into")
+      ->check(CLI::IsMember({1, 2, 4}).description(""))
+      ->default_str("2");
+  sub->add_option_function<std::string>(
+         "--as", [command](const std::string& text) { command->request.layers.output = outputNamed(text); },
+         "What --method layers makes OUT: the bins of IN, guided by its flat frame; the bins of IN in the colours of "
+         "their layers; a deep file of a sample for each layer; or the flat frame")
+      ->type_name("bins|layer-bins|layers|flat")
+      ->check(CLI::IsMember({"bins", "layer-bins", "layers", "flat"}).description(""))
+      ->default_str("bins");
+  option("--flat-guide", command->request.guide, "auto|nlm|neural|oidn|layers|none|FILE",
          "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of its network or "
          "Open Image Denoise, which also help with the bins, or in a file; auto is oidn where that is installed (but "
          "for fast), else nlm for best")

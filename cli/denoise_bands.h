@@ -3,13 +3,10 @@
 
 #include <vector>
 
+#include "cli/band.h"
 #include "cli/denoise_plan.h"
 
 namespace fathom::cli {
-
-struct Band {
-  int y0, y1;
-};
 
 // The whole frame where it fits `memory` bytes, else as few bands as possible of as many rows each, so that each fits with
 // `halo` more rows on both sides. Throws Error where a row does not fit, or a frame of a plan that needs it whole: its

@@ -36,7 +36,7 @@ std::optional<Chunk> ChunkReader::next() {
   Chunk chunk;
   try {
     Opening opening = Opening::Ready;
-    while (!source_) {
+    while (!source_ && !layers_) {
       if (next_ == order_.size()) return {};
       chunk.frame = order_[next_];
       opening = open();
@@ -51,7 +51,11 @@ std::optional<Chunk> ChunkReader::next() {
       chunk.guide = guide_;
       chunk.claim = claim_;
       chunk.band = bands_[band_];
-      chunk.image = read(chunk.notes);
+      chunk.layers = layers_;
+      if (layers_)
+        chunk.notes = layers_->notes();
+      else
+        chunk.image = read(chunk.notes);
       chunk.last = ++band_ == bands_.size();
     }
   } catch (const std::exception&) {
@@ -78,7 +82,10 @@ ChunkReader::Opening ChunkReader::open() {
     if (!claim_) return Opening::Elsewhere;
     if (isDone(frame.outputs, madeBy)) return Opening::Done;
   }
-
+  if (job_.plan.layers) {
+    openLayers(frame, madeBy);
+    return Opening::Ready;
+  }
   source_.emplace(openFrame(frame.inputs, job_.source, job_.plan));
   bands_ = planBands(*source_, job_.plan, halo_, job_.memory);
   if (bands_.size() > 1) job_.plan.firstImage.reset();
@@ -89,6 +96,19 @@ ChunkReader::Opening ChunkReader::open() {
                                                       source_->part().dataWindow, source_->flatAttributes(), madeBy,
                                                       job_.plan.record});
   return Opening::Ready;
+}
+
+void ChunkReader::openLayers(const DenoiseFrame& frame, const std::string& madeBy) {
+  layers_ = std::make_shared<LayersFrame>(*job_.plan.layers, frame.inputs, job_.source);
+  bands_ = layers_->bands();
+  const deep::PartInfo& part = layers_->source().part();
+  origin_ = std::make_shared<FrameOrigin>(FrameOrigin{.path = frame.inputs.main,
+                                                      .part = part.number,
+                                                      .dataWindow = part.dataWindow,
+                                                      .flatAttributes = {},
+                                                      .madeBy = madeBy,
+                                                      .record = {},
+                                                      .flattened = job_.plan.layers->output == LayersOutput::Flat});
 }
 
 bool ChunkReader::isDone(const FrameOutputs& outputs, const std::string& madeBy) const {
@@ -116,6 +136,7 @@ deep::DeepImage ChunkReader::read(std::set<std::string>& notes) {
 void ChunkReader::close() {
   source_.reset();
   guide_.reset();
+  layers_.reset();
   bands_.clear();
   claim_.reset();
   band_ = 0;

@@ -20,6 +20,7 @@ struct Chunk {
   Band band{0, 0};
   bool last = true;                              // of its frame
   std::shared_ptr<const deep::BaseGuide> guide;  // of the whole frame, where a band needs it
+  std::shared_ptr<LayersFrame> layers;           // reads the band itself, where the plan has it
   deep::DeepImage image;               // the band with the rows around it that decide it; then the band denoised
   bool kept = false;                   // nothing to do: the outputs are there
   bool elsewhere = false;              // nothing to do: another process makes them
@@ -47,6 +48,7 @@ class ChunkReader {
   Opening open();
   bool isDone(const FrameOutputs& outputs, const std::string& madeBy) const;
   deep::DeepImage read(std::set<std::string>& notes);
+  void openLayers(const DenoiseFrame& frame, const std::string& madeBy);
   void close();
 
   DenoiseJob& job_;
@@ -58,6 +60,7 @@ class ChunkReader {
   std::vector<Band> bands_;
   std::shared_ptr<const FrameOrigin> origin_;
   std::shared_ptr<const deep::BaseGuide> guide_;
+  std::shared_ptr<LayersFrame> layers_;
 };
 
 // The last stage.

@@ -205,8 +205,24 @@ void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOpt
   const auto first =
       std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
   FrameSource source = openFrame(*first, options, plan);
+  if (guideChoice(request) == kLayersBase) {
+    LayersOptions layers = request.layers;
+    layers.output = LayersOutput::Bins;
+    plan.guide = layersGuide(planLayers(request.base, layers, plan.denoise.params.quality, request.memory), options);
+    plan.denoise.guided = true;
+    return;
+  }
   plan.guide = planGuide(guideChoice(request), request.base, plan.denoise, source, request.memory, plan.notes);
   plan.denoise.guided = plan.guide.has_value();
+}
+
+// A whole frame by the layered network alone.
+AnyImage denoiseLayered(LayersPlan plan, const FrameInputs& inputs, const SourceOptions& options,
+                        const Progress& progress) {
+  plan.params.memory = 0;  // one band
+  LayersFrame frame(plan, inputs, options);
+  if (plan.output == LayersOutput::Flat) return frame.flattened(progress);
+  return frame.denoise(frame.bands().front(), progress, nullptr);
 }
 
 // The files that the frames of the whole sequence come to.
@@ -237,13 +253,39 @@ void setBudget(SequencePlan& plan, DenoiseRequest& request, const Sequence& sequ
   plan.denoise.params = request.params;
 }
 
+// Whether the layered network is asked for, for all of the work or as a guide; and what does not go with it.
+bool wantsLayers(const DenoiseRequest& request) {
+  const bool alone = request.base.name == kLayersBase && request.layers.output != LayersOutput::Bins;
+  if (!alone && guideChoice(request) != kLayersBase) return false;
+  if (request.timeBudget) usage("--time-budget", "expected another method than layers, whose work is not measured");
+  if (request.errors) usage("--error", "expected another method than layers, whose errors nothing tells");
+  if (alone && request.split) usage("--split", "expected --as bins: layers have no components");
+  if (alone && request.params.keepStatistics) usage("--keep", "expected --as bins: what is left describes no bins");
+  if (alone && request.guide != "auto") usage("--flat-guide", "expected --as bins: nothing else is guided");
+  return true;
+}
+
 // From the first frame of the sequence on disk, whether it is among the job's or not.
 SequencePlan makePlan(DenoiseRequest request, const Sequence& sequence, const SourceOptions& source,
                       const std::string& wanted) {
   std::vector<FrameInputs> candidates;
   for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
     candidates.push_back(inputsAt(request, sequence.pattern, frame));
+  const bool layers = wantsLayers(request);
+  const auto layered = [&](LayersOutput output) {
+    return planLayered(
+        candidates, source,
+        planLayers(request.base, {request.layers.count, output}, request.params.quality, request.memory));
+  };
+  if (layers && request.base.name == kLayersBase && request.layers.output != LayersOutput::Bins)
+    return layered(request.layers.output);
   SequencePlan plan = planSequence(candidates, source, request.params, wanted);
+  if (layers && !plan.deep) fail("{}: expected a deep file for --method layers, found a flat one", plan.first);
+  if (layers && !canBeGuided(plan.denoise.inputs)) {
+    SequencePlan other = layered(LayersOutput::LayerBins);
+    other.notes.insert(fmt::format("{}: nothing tells its noise: bins get the colours of their layers", other.first));
+    return other;
+  }
   plan.errors = request.errors;
   if (!plan.deep && !request.flattened.empty())
     fail("{}: expected a deep file for --flat, found a flat one", request.input);
@@ -262,7 +304,7 @@ SequencePlan makePlan(DenoiseRequest request, const Sequence& sequence, const So
 }  // namespace
 
 bool isGuideFile(const std::string& guide) {
-  for (const char* word : {"auto", kOwnBase, kNeuralBase, kOidnBase, "none"})
+  for (const char* word : {"auto", kOwnBase, kNeuralBase, kOidnBase, kLayersBase, "none"})
     if (guide == word) return false;
   return true;
 }
@@ -286,6 +328,7 @@ AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, i
   const FrameInputs inputs = inputsAt(request, sequence.pattern, frame);
   SequencePlan plan = makePlan(request, sequence, options, inputs.main);
   progress.at(0);
+  if (plan.layers) return denoiseLayered(*plan.layers, inputs, options, progress);
   FrameSource source = openFrame(inputs, options, plan);
   std::set<std::string> notes;
   deep::DeepImage image =

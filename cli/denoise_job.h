@@ -17,11 +17,12 @@ namespace fathom::cli {
 struct DenoiseRequest {
   std::string input, output, flattened;
   std::string features, alpha;
-  std::string guide = "auto";       // or nlm, neural, oidn, none, a file: see planGuide
+  std::string guide = "auto";       // or nlm, neural, oidn, layers, none, a file: see planGuide
   std::vector<std::string> halves;  // none or two
   std::string map, part;
   deep::DenoiseParams params;
   BaseOptions base;
+  LayersOptions layers;  // of --method layers
   // Seconds a frame, for its denoising: chooses the quality, and what else is left open, in the place of `params` (see
   // cli/denoise_budget).
   std::optional<double> timeBudget;

@@ -169,20 +169,38 @@ deep::DeepImage denoiseDeep(deep::DeepImage image, const FrameInputs& inputs, co
   return deep::denoise(std::move(image), plan.denoise, rest, stats, &rows);
 }
 
-}  // namespace
-
-SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
-                          const deep::DenoiseParams& params, const std::string& wanted) {
+// From the first of the frames that can be read; throws what the first one threw where none can.
+template <class Plan>
+SequencePlan planFromFirst(const std::vector<FrameInputs>& candidates, const Plan& planOf) {
   std::exception_ptr first;
   for (const FrameInputs& inputs : candidates) {
     try {
-      return planFrom(inputs, options, params, inputs.main == wanted);
+      return planOf(inputs);
     } catch (const Error& e) {
       if (!first) first = std::make_exception_ptr(Error(namingFile(e.what(), inputs.files())));
     }
   }
   if (first) std::rethrow_exception(first);
   fail("expected a frame to plan from, found none");
+}
+
+}  // namespace
+
+SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
+                          const deep::DenoiseParams& params, const std::string& wanted) {
+  return planFromFirst(
+      candidates, [&](const FrameInputs& inputs) { return planFrom(inputs, options, params, inputs.main == wanted); });
+}
+
+SequencePlan planLayered(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
+                         const LayersPlan& layers) {
+  return planFromFirst(candidates, [&](const FrameInputs& inputs) {
+    SequencePlan plan;
+    plan.first = inputs.main;
+    plan.layers = layers;
+    plan.notes = LayersFrame(layers, inputs, options).notes();
+    return plan;
+  });
 }
 
 int runsOf(const SequencePlan& plan) {
@@ -223,6 +241,7 @@ deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& input
 }
 
 std::string describePlan(const SequencePlan& plan) {
+  if (plan.layers) return plan.layers->settings;
   return fmt::format("{} cluster {} {} guide {} errors {}", describeFilter(plan.denoise), plan.cameraSamples,
                      plan.base ? plan.base->settings : "", plan.guide ? plan.guide->settings : "none", plan.errors);
 }

@@ -11,6 +11,7 @@
 #include "cli/denoise_setting.h"
 #include "cli/frame_guide.h"
 #include "cli/frame_source.h"
+#include "cli/layers_frame.h"
 #include "deep/denoise.h"
 
 namespace fathom::cli {
@@ -22,6 +23,7 @@ struct SequencePlan {
   // Denoises the frames, which are flat, instead of `denoise`; none: nothing does. It needs whole frames.
   std::optional<BaseDenoiser> base;
   std::optional<GuidePlan> guide;      // of deep frames
+  std::optional<LayersPlan> layers;    // makes all of the output, from the frame's samples, instead of `denoise`
   bool errors = false;                 // error.{R,G,B} beside the colours; it needs whole frames
   std::optional<BudgetRecord> record;  // what a time budget chose, for the outputs to say
   std::set<std::string> notes;         // lines for the user
@@ -35,6 +37,10 @@ struct SequencePlan {
 // `wanted` is the main file of a frame that will be denoised next.
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
                           const deep::DenoiseParams& params, const std::string& wanted);
+
+// For a plan that the layered network alone carries out: from the first of the candidates that can be opened.
+SequencePlan planLayered(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
+                         const LayersPlan& layers);
 
 // Runs of the denoiser that a frame takes: one, and those that measure its errors where these are wanted and the filter
 // does not tell them itself.

@@ -82,6 +82,11 @@ class SequenceRun {
         stop_};
     const Stopwatch watch;
     try {
+      if (chunk.layers) {
+        chunk.image = chunk.layers->denoise(chunk.band, progress, &report.stats);
+        report.seconds += watch.seconds();
+        return;
+      }
       chunk.image = denoiseAsPlanned(std::move(chunk.image), job_.frames[chunk.frame].inputs, job_.plan,
                                      chunk.guide.get(), progress, &report.stats);
       const Box& around = chunk.image.dataWindow;

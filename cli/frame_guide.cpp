@@ -112,10 +112,15 @@ bool fits(const GuidePlan& guide, FrameSource& source, size_t memory) {
   return double(all) <= kMostOfMemory * double(workingBytes(memory));
 }
 
-// The plan's denoisers, or one that reads the frame's file.
+// The plan's denoisers, or one that reads the frame's files; for as long as both are there.
 deep::GuideDenoisers denoisersOf(const GuidePlan& guide, const FrameInputs& inputs) {
   deep::GuideDenoisers denoisers = guide.denoisers;
-  if (!denoisers.flattened) denoisers.flattened = fileDenoiser(inputs.guide);
+  if (guide.flattened)
+    denoisers.flattened = [&](const flat::Image&, const Progress& progress) {
+      return guide.flattened(inputs, progress);
+    };
+  else if (!denoisers.flattened)
+    denoisers.flattened = fileDenoiser(inputs.guide);
   return denoisers;
 }
 

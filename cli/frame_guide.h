@@ -1,6 +1,7 @@
 // What guides the bins of deep frames: --flat-guide, decided once per sequence and made for every frame.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,8 @@ struct GuidePlan {
   bool wholeFrame = true;          // else a band of rows can be guided by what is made of that band
   std::string settings;            // all that decides what it makes, as text to be hashed
   BytesOf bytes = {};              // that its library or network takes beside it
+  // Makes the flattened frame from the frame's files, where that is not done by `denoisers`: from samples.
+  std::function<flat::Image(const FrameInputs&, const Progress&)> flattened = {};
 };
 
 // Bytes that a guide takes: of each pixel while it is made, and of each that is kept for bands of the frame; and its library

@@ -134,7 +134,7 @@ Standing standingOf(const std::string& path, const char* attribute, const std::s
 FrameSink::FrameSink(const FrameOutputs& outputs, FrameOrigin origin) : origin_(std::move(origin)) {
   for (const auto& [name, path] : outputs.components) outputs_.push_back(std::make_unique<Output>(path, name, false));
   if (!outputs.flattened.empty()) outputs_.push_back(std::make_unique<Output>(outputs.flattened, "", true));
-  outputs_.push_back(std::make_unique<Output>(outputs.image, "", false));
+  outputs_.push_back(std::make_unique<Output>(outputs.image, "", origin_.flattened));
 }
 
 FrameSink::FrameSink(FrameSink&&) noexcept = default;

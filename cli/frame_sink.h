@@ -40,6 +40,7 @@ struct FrameOrigin {
   std::map<std::string, std::string> flatAttributes;
   std::string madeBy;
   std::optional<BudgetRecord> record;
+  bool flattened = false;  // the image itself is written as a flat one
 };
 
 class FrameSink {

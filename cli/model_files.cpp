@@ -46,6 +46,20 @@ std::string pathOf(const std::string& model) {
        fmt::join(modelFolders(), " or "));
 }
 
+template <class Result, class Net>
+Result load(const std::string& model, nn::Precision precision) {
+  Result result;
+  result.path = pathOf(model);
+  const nn::WeightFile file = nn::readWeights(result.path);
+  result.net = std::make_shared<Net>(file, precision);
+  for (const auto& [name, tensor] : file.tensors) result.parameters += tensor.values.size();
+  result.name = textOf(file, "name");
+  result.steps = textOf(file, "steps");
+  result.licence = textOf(file, "licence");
+  result.settings = hashOf(result.path);
+  return result;
+}
+
 }  // namespace
 
 std::vector<std::string> modelFolders() {
@@ -74,16 +88,16 @@ std::vector<std::string> findModels() {
 }
 
 Model loadModel(const std::string& model, nn::Precision precision) {
-  Model result;
-  result.path = pathOf(model);
-  const nn::WeightFile file = nn::readWeights(result.path);
-  result.net = std::make_shared<nn::CompositionalNet>(file, precision);
-  for (const auto& [name, tensor] : file.tensors) result.parameters += tensor.values.size();
-  result.name = textOf(file, "name");
-  result.steps = textOf(file, "steps");
-  result.licence = textOf(file, "licence");
-  result.settings = hashOf(result.path);
-  return result;
+  return load<Model, nn::CompositionalNet>(model, precision);
+}
+
+LayersModel loadLayersModel(const std::string& model, nn::Precision precision) {
+  return load<LayersModel, nn::LayersNet>(model, precision);
+}
+
+bool isLayersModel(const std::string& path) {
+  const nn::WeightFile file = nn::readWeights(path);
+  return textOf(file, "format") == "fathom-layers";
 }
 
 bool hasMix() {

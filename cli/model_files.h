@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nn/compositional.h"
+#include "nn/layers.h"
 #include "nn/mix.h"
 
 namespace fathom::cli {
@@ -17,16 +18,32 @@ std::vector<std::string> modelFolders();
 // The weight files in them, by their names; of two with the same name the first.
 std::vector<std::string> findModels();
 
-struct Model {
+struct ModelFile {
   std::string path;
-  std::shared_ptr<const nn::CompositionalNet> net;
   size_t parameters = 0;
   std::string name, steps, licence;  // as the file says, "" where it does not
   std::string settings;              // tells its content, to be hashed
 };
 
+// The denoiser of flat frames.
+struct Model : ModelFile {
+  std::shared_ptr<const nn::CompositionalNet> net;
+};
+
+// That of deep frames, by layers.
+struct LayersModel : ModelFile {
+  std::shared_ptr<const nn::LayersNet> net;
+};
+
+// The name of the layered network that comes with the program.
+constexpr const char* kLayersModel = "layers";
+
 // `model`: a name that findModels finds (small, base), or a file. Throws Error where it cannot be had.
 Model loadModel(const std::string& model, nn::Precision precision = nn::Precision::float32);
+LayersModel loadLayersModel(const std::string& model, nn::Precision precision = nn::Precision::float32);
+
+// Whether a file of weights is of the layered network.
+bool isLayersModel(const std::string& path);
 
 // The mixing network.
 struct MixModel {

@@ -152,7 +152,8 @@ size_t imageBytes(const flat::Image& noisy, size_t denoisers) {
   return noisy.dataWindow.area() * (2 * noisy.planes.size() * sizeof(float) + kPixel + denoisers * kCandidate);
 }
 
-void expectMemory(const std::string& file, const flat::Image& noisy, const std::vector<NamedBase>& bases, size_t memory) {
+void expectMemory(const std::string& file, const flat::Image& noisy, const std::vector<NamedBase>& bases,
+                  size_t memory) {
   const auto bytes = [&](size_t limit) {
     size_t most = 0;
     for (const NamedBase& base : bases)

@@ -60,6 +60,22 @@ void toBfloat16(const float* from, size_t count, uint16_t* to) {
   }
 }
 
+void toElements(const float* from, size_t count, Element element, std::byte* to) {
+  if (element == Element::float32)
+    std::memcpy(to, from, count * sizeof(float));
+  else
+    toBfloat16(from, count, reinterpret_cast<uint16_t*>(to));
+}
+
+void toFloats(const std::byte* from, size_t count, Element element, float* to) {
+  if (element == Element::float32) {
+    std::memcpy(to, from, count * sizeof(float));
+    return;
+  }
+  const auto* halves = reinterpret_cast<const uint16_t*>(from);
+  for (size_t i = 0; i < count; ++i) to[i] = std::bit_cast<float>(uint32_t(halves[i]) << 16);
+}
+
 void packPlanes(const ConstPlanes& from, int height, int width, int block, Element element, std::byte* to) {
   const size_t rowValues = size_t(width) * size_t(block), rowBytes = rowValues * bytesOf(element);
   std::vector<float> floats(element == Element::float32 ? 0 : rowValues);
@@ -85,6 +101,17 @@ void cropGroups(const std::byte* from, size_t groups, int height, int width, siz
       std::memcpy(to,
                   from + ((g * size_t(height) + size_t(window.y + y)) * size_t(width) + size_t(window.x)) * pixelBytes,
                   rowBytes);
+}
+
+void pasteGroups(const std::byte* from, size_t groups, int height, int width, size_t pixelBytes, const Window& window,
+                 std::byte* to, int toHeight, int toWidth, int x, int y) {
+  const auto at = [&](size_t g, int rows, int columns, int row, int column) {
+    return ((g * size_t(rows) + size_t(row)) * size_t(columns) + size_t(column)) * pixelBytes;
+  };
+  for (size_t g = 0; g < groups; ++g)
+    for (int i = 0; i < window.height; ++i)
+      std::memcpy(to + at(g, toHeight, toWidth, y + i, x), from + at(g, height, width, window.y + i, window.x),
+                  size_t(window.width) * pixelBytes);
 }
 
 void enlargeGroups(const std::byte* from, size_t groups, int height, int width, size_t pixelBytes, std::byte* to) {

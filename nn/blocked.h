@@ -27,9 +27,17 @@ void toBfloat16(const float* from, size_t count, uint16_t* to);
 // Planes to groups of `block` (8 or 16); what the last group has more than there are planes becomes 0.
 void packPlanes(const ConstPlanes& from, int height, int width, int block, Element element, std::byte* to);
 
+// Of a count of values in either type.
+void toElements(const float* from, size_t count, Element element, std::byte* to);
+void toFloats(const std::byte* from, size_t count, Element element, float* to);
+
 // One window of [groups][height][width] pixels of `pixelBytes` bytes, without gaps.
 void cropGroups(const std::byte* from, size_t groups, int height, int width, size_t pixelBytes, const Window& window,
                 std::byte* to);
+
+// A window of `from`, [groups][height][width] pixels, to the place of one as large in `to`, [groups][toHeight][toWidth].
+void pasteGroups(const std::byte* from, size_t groups, int height, int width, size_t pixelBytes, const Window& window,
+                 std::byte* to, int toHeight, int toWidth, int x, int y);
 
 // Every pixel four times: [groups][height][width] to [groups][2 height][2 width]. `pixelBytes` is 16, 32 or 64.
 void enlargeGroups(const std::byte* from, size_t groups, int height, int width, size_t pixelBytes, std::byte* to);

@@ -10,6 +10,8 @@
 #include "nn/blocked.h"
 #include "nn/colour_kernel.h"
 #include "nn/compositional_halo.h"
+#include "nn/metadata.h"
+#include "nn/tile_work.h"
 
 namespace fathom::nn {
 
@@ -17,42 +19,6 @@ namespace {
 
 constexpr int kColours = 3;
 constexpr int kScales = 3;
-constexpr int kMostWidth = 256;
-
-const std::string& metadata(const WeightFile& file, const std::string& key) {
-  const auto found = file.metadata.find(key);
-  if (found == file.metadata.end()) fail("{}: metadata {} is missing", file.name, key);
-  return found->second;
-}
-
-void expectMetadata(const WeightFile& file, const std::string& key, const std::string& expected) {
-  const std::string& found = metadata(file, key);
-  if (found != expected)
-    fail("{}, metadata {}: expected {}, found {}", file.name, key, expected, printable(found.substr(0, 60)));
-}
-
-int widthOf(const WeightFile& file) {
-  const std::string& text = metadata(file, "width");
-  int width = 0;
-  if (text.size() <= 3 && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; }))
-    for (const char c : text) width = 10 * width + (c - '0');
-  if (width <= 0 || width > kMostWidth || width % 16 != 0)
-    fail("{}, metadata width: expected a multiple of 16 up to {}, found {}", file.name, kMostWidth,
-         printable(text.substr(0, 60)));
-  return width;
-}
-
-// A window with `halo` more around it, as far as there is a frame.
-Window grown(const Window& window, int halo, int height, int width) {
-  const int x0 = std::max(window.x - halo, 0), y0 = std::max(window.y - halo, 0);
-  const int x1 = std::min(window.x + window.width + halo, width),
-            y1 = std::min(window.y + window.height + halo, height);
-  return {x0, y0, x1 - x0, y1 - y0};
-}
-
-size_t area(const Window& window) {
-  return size_t(window.width) * size_t(window.height);
-}
 
 template <class T>
 T* grow(Buffer<T>& buffer, size_t size) {

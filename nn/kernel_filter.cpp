@@ -176,29 +176,36 @@ void filterColour(const float* logits, int block, const BorderedColour& colour, 
 
 void halve(const ConstPlanes& from, int height, int width, const Planes& to) {
   const auto halveRow = HWY_DYNAMIC_DISPATCH(HalveRow);
-  for (size_t c = 0; c < kColours; ++c)
+  for (size_t c = 0; c < from.plane.size(); ++c)
     for (int y = 0; y < height / 2; ++y)
       halveRow(from.row(c, 2 * y), from.row(c, 2 * y + 1), size_t(width / 2), to.row(c, y));
 }
 
-void addCoarse(const Planes& fine, int height, int width, const float* alpha, const Planes& coarse) {
+void addEnlarged(const Planes& fine, int height, int width, const float* alpha, ptrdiff_t alphaStride,
+                 const ConstPlanes& coarse) {
   const int halfHeight = height / 2;
   const size_t halfWidth = size_t(width / 2);
-  std::vector<float> mean(halfWidth), mixed(halfWidth + 3 * kSlack), enlarged(2 * (halfWidth + kSlack));
-  const auto halveRow = HWY_DYNAMIC_DISPATCH(HalveRow);
+  std::vector<float> mixed(halfWidth + 3 * kSlack), enlarged(2 * (halfWidth + kSlack));
   const auto enlargeRow = HWY_DYNAMIC_DISPATCH(EnlargeRow);
-  for (size_t c = 0; c < kColours; ++c) {
-    for (int y = 0; y < halfHeight; ++y) {
+  for (size_t c = 0; c < fine.plane.size(); ++c)
+    for (int y = 0; y < height; ++y) {
+      const int far = std::clamp(y % 2 ? y / 2 + 1 : y / 2 - 1, 0, halfHeight - 1);
+      enlargeRow(coarse.row(c, y / 2), coarse.row(c, far), halfWidth, alpha + y * alphaStride, mixed.data(),
+                 enlarged.data(), fine.row(c, y));
+    }
+}
+
+void addCoarse(const Planes& fine, int height, int width, const float* alpha, const Planes& coarse) {
+  const size_t halfWidth = size_t(width / 2);
+  std::vector<float> mean(halfWidth);
+  const auto halveRow = HWY_DYNAMIC_DISPATCH(HalveRow);
+  for (size_t c = 0; c < kColours; ++c)
+    for (int y = 0; y < height / 2; ++y) {
       halveRow(fine.row(c, 2 * y), fine.row(c, 2 * y + 1), halfWidth, mean.data());
       float* difference = coarse.row(c, y);
       for (size_t x = 0; x < halfWidth; ++x) difference[x] -= mean[x];
     }
-    for (int y = 0; y < height; ++y) {
-      const int far = std::clamp(y % 2 ? y / 2 + 1 : y / 2 - 1, 0, halfHeight - 1);
-      enlargeRow(coarse.row(c, y / 2), coarse.row(c, far), halfWidth, alpha + size_t(y) * size_t(width), mixed.data(),
-                 enlarged.data(), fine.row(c, y));
-    }
-  }
+  addEnlarged(fine, height, width, alpha, width, {{coarse.plane.begin(), coarse.plane.end()}, coarse.stride});
 }
 
 }  // namespace fathom::nn

@@ -44,8 +44,12 @@ class BorderedColour {
 // which overlap nothing else.
 void filterColour(const float* logits, int block, const BorderedColour& colour, const Planes& filtered, float* alpha);
 
-// Each of 3 planes of height x width (even) becomes the mean of its 2x2 pixels.
+// Each plane of height x width (even) becomes the mean of its 2x2 pixels.
 void halve(const ConstPlanes& from, int height, int width, const Planes& to);
+
+// fine += alpha * U(coarse) for planes of height x width (even) and half of both; alpha: one plane like the fine ones.
+void addEnlarged(const Planes& fine, int height, int width, const float* alpha, ptrdiff_t alphaStride,
+                 const ConstPlanes& coarse);
 
 // fine += alpha * U(coarse - D(fine)) for 3 planes of height x width (even) and half of both. `coarse` becomes the
 // difference. alpha: [height][width].

@@ -5,12 +5,13 @@
 #include <map>
 
 #include "base/parallel.h"
+#include "nn/tile_work.h"
 
 namespace fathom::nn {
 
 namespace {
 
-constexpr int kSmallest = 64, kFair = 256, kLargest = 512, kStep = 32;
+constexpr int kSmallest = 64, kFair = 256, kLargest = 512;
 constexpr double kTogether = 8;     // tiles that should fit into the memory at once, as long as they stay fair
 constexpr double kTileCost = 2000;  // of a tile beside its arithmetic, in pixels with K = 1
 constexpr std::array<int, 3> kComponents = {1, 2, 4};
@@ -25,18 +26,9 @@ int tileSide(const CompositionalNet& net, int components, size_t memory) {
   const auto tooLarge = [&](double tiles) {
     return memory && tiles * bytesOfSides(net, side, side, components) > double(memory);
   };
-  while (side > kFair && tooLarge(kTogether)) side -= kStep;
-  while (side > kSmallest && tooLarge(1)) side -= kStep;
+  while (side > kFair && tooLarge(kTogether)) side -= kTileStep;
+  while (side > kSmallest && tooLarge(1)) side -= kTileStep;
   return side;
-}
-
-// Parts of about equal length, at most `most`, each but the last a multiple of kStep.
-std::vector<int> cuts(int length, int most) {
-  const int parts = (length + most - 1) / most;
-  const int part = parts ? ((length + parts - 1) / parts + kStep - 1) / kStep * kStep : 0;
-  std::vector<int> result = {0};
-  while (result.back() < length) result.push_back(std::min(result.back() + part, length));
-  return result;
 }
 
 std::vector<Window> cut(const Window& window, int side) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "nn/tile_work.h"
 
 namespace fathom::nn {
 
@@ -31,23 +32,6 @@ class Workspaces {
  private:
   std::mutex guard_;
   std::vector<std::unique_ptr<CompositionalNet::Workspace>> free_;
-};
-
-// Counts what is done, by arithmetic.
-class Done {
- public:
-  Done(double all, const Progress& progress) : all_(all), progress_(progress) {}
-
-  void add(double part) {
-    const std::lock_guard lock(guard_);
-    sum_ += part;
-    progress_.at(std::min(sum_ / all_, 1.0));
-  }
-
- private:
-  double all_, sum_ = 0;
-  const Progress& progress_;
-  std::mutex guard_;
 };
 
 }  // namespace

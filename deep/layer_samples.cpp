@@ -1,0 +1,304 @@
+#include "deep/layer_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "base/parallel.h"
+#include "flat/finite.h"
+#include "flat/neural_planes.h"
+#include "nn/colour_kernel.h"
+
+namespace fathom::deep {
+
+namespace {
+
+constexpr float kUnknownAlbedo = 0.5f;
+constexpr float kCocUnit = 4;  // pixels
+constexpr float kDark = 0.01f;
+constexpr float kLargestDeviation = 8;
+constexpr float kCountUnit = 8;        // doublings
+constexpr float kMostExposed = 1e30f;  // beyond all light; sums of it are finite
+
+enum InputAt : size_t {
+  kDiffuseAt = 0,
+  kSpecularAt = 3,
+  kAlbedoAt = 6,
+  kNormalAt = 9,
+  kDepthAt = 12,
+  kCocAt = 13,
+  kLensAt = 14,
+  kNoiseAt = 17,
+  kCountAt = 19
+};
+
+using Triple = std::array<std::span<const float>, 3>;
+
+Triple tripleOf(const DeepImage& image, const std::string& prefix, const char* letters = "RGB") {
+  Triple result;
+  for (size_t c = 0; c < 3; ++c) result[c] = image.get(prefix + letters[c]);
+  return result;
+}
+
+// The channels that the network takes its light from.
+struct Light {
+  Triple diffuse, specular;  // no diffuse: all light is specular
+
+  Light(const DeepImage& image, const LayerInputs& inputs)
+      : diffuse(inputs.components ? tripleOf(image, "diffuse.") : Triple()),
+        specular(tripleOf(image, inputs.components ? "specular." : "")) {}
+
+  float diffuseAt(size_t c, uint64_t s) const { return diffuse[c].empty() ? 0.0f : diffuse[c][s]; }
+  float specularAt(size_t c, uint64_t s) const { return specular[c][s]; }
+  float at(size_t c, uint64_t s) const { return diffuseAt(c, s) + specularAt(c, s); }
+
+  bool finite(uint64_t s, float alpha) const {
+    for (size_t c = 0; c < 3; ++c)
+      if (!isFinite(diffuseAt(c, s) / alpha) || !isFinite(specularAt(c, s) / alpha)) return false;
+    return true;
+  }
+};
+
+// Calls used(place, weight, alpha) for the samples of a pixel that have a say, and emits(place, passed) for those without
+// alpha and with finite values.
+template <class Used, class Emits>
+void forSamples(const DeepImage& image, const Light& light, std::span<const float> alphas,
+                std::span<const float> depths, size_t pixel, const Used& used, const Emits& emits) {
+  double passed = 1;
+  for (uint64_t s = image.offsets[pixel]; s < image.offsets[pixel + 1]; ++s) {
+    const float alpha = alphas[s] > 0 ? std::min(alphas[s], 1.0f) : 0.0f;
+    const auto weight = float(passed * double(alpha));
+    if (alpha <= 0 && light.finite(s, 1)) emits(s, float(passed));
+    if (weight > 0 && isFinite(depths[s]) && light.finite(s, alpha)) used(s, weight, alpha);
+    passed *= 1 - double(alpha);
+  }
+}
+
+bool has(std::span<const std::string> channels, const std::string& prefix, const char* letters = "RGB") {
+  return std::ranges::all_of(std::string(letters), [&](char letter) {
+    return std::ranges::find(channels, prefix + letter) != channels.end();
+  });
+}
+
+// The root of the mean of three variances; 0 where one is unknown.
+float deviationAt(const Triple& variance, uint64_t s) {
+  float sum = 0;
+  for (const std::span<const float>& v : variance) {
+    if (!std::isfinite(v[s])) return 0;
+    sum += std::clamp(v[s], 0.0f, kMostExposed) / 3;
+  }
+  return std::sqrt(sum);
+}
+
+// One row of inputs, plane by plane.
+class RowMaker {
+ public:
+  RowMaker(const DeepImage& image, const LayerInputs& inputs, const LayerScale& scale, const Light& light,
+           LayerRow& row)
+      : image_(image), inputs_(inputs), scale_(scale), light_(light), places_(row.places), samples_(row.samples) {}
+
+  void make(const std::vector<float>& weights, const std::vector<float>& alphas) {
+    std::ranges::copy(weights, plane(nn::kWeightInput));
+    addLight(alphas);
+    addFeatures(alphas);
+    addDepths();
+    addNoise();
+    addCounts(weights);
+    const size_t count = places_.size();
+    nn::logColour(plane(kDiffuseAt), 6 * count, nn::Element::float32, reinterpret_cast<std::byte*>(plane(kDiffuseAt)));
+    nn::logColour(plane(kNoiseAt), 3 * count, nn::Element::float32, reinterpret_cast<std::byte*>(plane(kNoiseAt)));
+    for (size_t i = 0; i < count; ++i) plane(kCountAt)[i] *= std::numbers::log2e_v<float> / kCountUnit;
+  }
+
+ private:
+  float* plane(size_t p) { return samples_.plane(p); }
+
+  template <class Value>
+  void fill(size_t p, const Value& value) {
+    float* to = plane(p);
+    for (size_t i = 0; i < places_.size(); ++i) to[i] = value(places_[i], i);
+  }
+
+  // As it is, and with a logarithm to be taken.
+  void addLight(const std::vector<float>& alphas) {
+    const float e = scale_.exposure;
+    for (size_t c = 0; c < 3; ++c) {
+      const auto exposed = [&](float value, size_t i) {
+        return std::min(std::max(e * value / alphas[i], 0.0f), kMostExposed);
+      };
+      fill(kDiffuseAt + c, [&](uint64_t s, size_t i) { return exposed(light_.diffuseAt(c, s), i); });
+      fill(kSpecularAt + c, [&](uint64_t s, size_t i) { return exposed(light_.specularAt(c, s), i); });
+      fill(nn::kExposedAt + c, [&](uint64_t s, size_t i) {
+        return std::clamp(e * light_.at(c, s) / alphas[i], -kMostExposed, kMostExposed);
+      });
+    }
+  }
+
+  void addFeatures(const std::vector<float>& alphas) {
+    const auto add = [&](bool given, size_t first, const std::string& prefix, const char* letters, float least,
+                         float none) {
+      const Triple values = given ? tripleOf(image_, prefix, letters) : Triple();
+      for (size_t c = 0; c < 3; ++c)
+        fill(first + c, [&](uint64_t s, size_t i) {
+          return given ? std::clamp(finiteOrZero(values[c][s] / alphas[i]), least, 1.0f) : none;
+        });
+    };
+    add(inputs_.albedo, kAlbedoAt, "albedo.", "RGB", 0, kUnknownAlbedo);
+    add(inputs_.normal, kNormalAt, "N.", "XYZ", -1, 0);
+  }
+
+  void addDepths() {
+    const std::span<const float> z = image_.get("Z");
+    fill(nn::kSampleDepth, [&](uint64_t s, size_t) { return z[s]; });
+    fill(kDepthAt, [&](uint64_t s, size_t) { return z[s] > 0 ? z[s] / (z[s] + scale_.depth) : 0.0f; });
+    const std::span<const float> coc = inputs_.coc ? image_.get("coc") : std::span<const float>();
+    fill(kCocAt, [&](uint64_t s, size_t) {
+      const float c = coc.empty() ? 0.0f : finiteOrZero(coc[s]);
+      return c / (std::abs(c) + kCocUnit);
+    });
+    for (size_t k = 0; k < 2; ++k) {
+      const std::span<const float> lens = inputs_.lens ? image_.get(k ? "lens.V" : "lens.U") : std::span<const float>();
+      fill(kLensAt + k,
+           [&](uint64_t s, size_t) { return lens.empty() ? 0.0f : std::clamp(finiteOrZero(lens[s]), -1.0f, 1.0f); });
+    }
+  }
+
+  // After the light, before its logarithm.
+  void addNoise() {
+    const std::string specular = inputs_.specularVariance ? "variance.specular." : "variance.";
+    const bool given[] = {inputs_.diffuseVariance, inputs_.specularVariance || inputs_.variance};
+    for (size_t k = 0; k < 2; ++k) {
+      const Triple variance = given[k] ? tripleOf(image_, k ? specular : "variance.diffuse.") : Triple();
+      const float* light = plane(k ? kSpecularAt : kDiffuseAt);
+      const size_t count = places_.size();
+      fill(kNoiseAt + k, [&](uint64_t s, size_t i) {
+        if (!given[k]) return 0.0f;
+        const float mean = light[i] / 3 + light[count + i] / 3 + light[2 * count + i] / 3;
+        return std::min(scale_.exposure * deviationAt(variance, s) / (mean + kDark), kLargestDeviation);
+      });
+    }
+  }
+
+  void addCounts(const std::vector<float>& weights) {
+    const std::span<const float> counts = inputs_.counts ? image_.get("samples") : std::span<const float>();
+    fill(kCountAt, [&](uint64_t s, size_t i) {
+      if (!counts.empty()) return std::max(finiteOrZero(counts[s]), 0.0f);
+      return inputs_.spp > 0 ? weights[i] * float(inputs_.spp) : 1.0f;
+    });
+  }
+
+  const DeepImage& image_;
+  const LayerInputs& inputs_;
+  const LayerScale& scale_;
+  const Light& light_;
+  const std::vector<uint64_t>& places_;
+  nn::SampleRow& samples_;
+};
+
+}  // namespace
+
+LayerInputs findLayerInputs(std::span<const std::string> channels, const Attributes& attributes) {
+  const auto given = [&](const char* name) { return std::ranges::find(channels, name) != channels.end(); };
+  return {.components = has(channels, "diffuse.") && has(channels, "specular."),
+          .albedo = has(channels, "albedo."),
+          .normal = has(channels, "N.", "XYZ"),
+          .coc = given("coc"),
+          .lens = given("lens.U") && given("lens.V"),
+          .diffuseVariance = has(channels, "variance.diffuse."),
+          .specularVariance = has(channels, "variance.specular."),
+          .variance = has(channels, "variance."),
+          .counts = given("samples"),
+          .spp = std::max(attributes.getInt("fathom:spp").value_or(0), 0)};
+}
+
+std::vector<std::string> describeMissing(const LayerInputs& inputs) {
+  std::vector<std::string> lines;
+  if (!inputs.components) lines.emplace_back("no diffuse.* and specular.*: all light is taken for one kind");
+  if (!inputs.albedo && !inputs.normal)
+    lines.emplace_back("no albedo.* or N.*: the network has less to go by");
+  else if (!inputs.albedo || !inputs.normal)
+    lines.emplace_back(inputs.albedo ? "no N.*: the network has less to go by"
+                                     : "no albedo.*: the network has less to go by");
+  if (!inputs.counts && inputs.spp <= 0)
+    lines.emplace_back("no samples and no fathom:spp: each deep sample is taken for one camera sample");
+  return lines;
+}
+
+bool layersRead(const LayerInputs& inputs, const std::string& channel) {
+  const auto of = [&](const char* prefix) { return channel.starts_with(prefix); };
+  if (channel == "A" || channel == "Z" || channel == "ZBack") return true;
+  if (channel.size() == 1) return !inputs.components;
+  if (of("variance.diffuse.")) return inputs.diffuseVariance;
+  if (of("variance.specular.")) return inputs.specularVariance;
+  if (of("variance.")) return channel.size() == 10 && inputs.variance && !inputs.specularVariance;
+  return of("diffuse.") || of("specular.") || of("albedo.") || of("N.") || channel == "coc" || of("lens.") ||
+         channel == "samples";
+}
+
+LayerScaleSum::LayerScaleSum(const Box& dataWindow) : dataWindow_(dataWindow), light_(3 * dataWindow.area(), 0.0f) {}
+
+void LayerScaleSum::add(const DeepImage& rows, const LayerInputs& inputs) {
+  const Light light(rows, inputs);
+  const std::span<const float> alpha = rows.get("A"), z = rows.get("Z");
+  const int height = rows.dataWindow.height(), width = rows.dataWindow.width();
+  const size_t first = size_t(rows.dataWindow.y0 - dataWindow_.y0) * size_t(width), plane = dataWindow_.area();
+  std::vector<double> depth(static_cast<size_t>(height), 0), weight(static_cast<size_t>(height), 0);
+  parallelFor(0, height, [&](int y) {
+    for (size_t pixel = size_t(y) * size_t(width); pixel < size_t(y + 1) * size_t(width); ++pixel) {
+      std::array<double, 3> sum{};
+      forSamples(
+          rows, light, alpha, z, pixel,
+          [&](uint64_t s, float w, float a) {
+            for (size_t c = 0; c < 3; ++c) sum[c] += double(w) * double(light.at(c, s) / a);
+            depth[size_t(y)] += double(w) * double(z[s]);
+            weight[size_t(y)] += double(w);
+          },
+          [](uint64_t, float) {});
+      for (size_t c = 0; c < 3; ++c) light_[c * plane + first + pixel] = float(sum[c]);
+    }
+  });
+  for (size_t y = 0; y < depth.size(); ++y) depth_ += depth[y], weight_ += weight[y];
+}
+
+LayerScale LayerScaleSum::result() const {
+  flat::Image frame{dataWindow_, dataWindow_, {}, {}};
+  for (size_t c = 0; c < 3; ++c)
+    std::copy_n(light_.data() + c * dataWindow_.area(), dataWindow_.area(),
+                frame.add(std::string(1, "RGB"[c])).values.data());
+  const double mean = weight_ > 0 ? depth_ / weight_ : 1;
+  return {flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f};
+}
+
+LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerScale& scale, int y) {
+  const Light light(rows, inputs);
+  const std::span<const float> alpha = rows.get("A"), z = rows.get("Z");
+  const auto width = size_t(rows.dataWindow.width());
+  LayerRow row;
+  row.emission = Buffer<float>(3 * width, 0.0f);
+  row.emissionDepth = Buffer<float>(width, 0.0f);
+  row.samples.first.push_back(0);
+  std::vector<float> weights, alphas;
+  const size_t first = size_t(y - rows.dataWindow.y0) * width;
+  for (size_t x = 0; x < width; ++x) {
+    forSamples(
+        rows, light, alpha, z, first + x,
+        [&](uint64_t s, float w, float a) {
+          row.places.push_back(s);
+          weights.push_back(w);
+          alphas.push_back(a);
+        },
+        [&](uint64_t s, float passed) {
+          for (size_t c = 0; c < 3; ++c) row.emission[c * width + x] += passed * light.at(c, s);
+          if (row.emissionDepth[x] == 0 && isFinite(z[s])) row.emissionDepth[x] = z[s];
+        });
+    row.samples.first.push_back(uint32_t(row.places.size()));
+    for (uint64_t s = rows.offsets[first + x]; s < rows.offsets[first + x + 1]; ++s)
+      row.nonFinite += alpha[s] > 0 && (!isFinite(z[s]) || !light.finite(s, std::min(alpha[s], 1.0f)));
+  }
+  row.samples.values = Buffer<float>(nn::kSamplePlanes * row.places.size());
+  RowMaker(rows, inputs, scale, light, row).make(weights, alphas);
+  return row;
+}
+
+}  // namespace fathom::deep

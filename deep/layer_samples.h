@@ -1,0 +1,76 @@
+// What the layered network sees of a deep frame: 20 inputs for each sample, and what its filters spread.
+//
+// Source: Fathom's own; nn/train/samples.py makes the same for training. With c a sample's light divided by its alpha, e the
+// exposure that brings the flattened frame to one brightness, and w the sample's share of its pixel:
+//
+//   0-2    log(1 + e c) of the diffuse light      3-5  of the specular light, which is all light where there is one kind
+//   6-8    albedo (0.5 where there is none)       9-11 normal
+//   12     z / (z + m), m the mean depth of the frame by weight
+//   13     circle of confusion c / (|c| + 4)      14, 15  place on the lens
+//   16     w
+//   17, 18 log(1 + the relative deviation of the means of diffuse and specular light), at most that of 8; 0 where unknown
+//   19     log2(1 + n) / 8, n the camera samples in a bin
+//
+// Camera samples and bins are both taken so. A sample of alpha 0, or with a colour or depth that is not finite, has no say.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "deep/image.h"
+#include "nn/layers.h"
+
+namespace fathom::deep {
+
+// What of the channel convention a frame offers to the network.
+struct LayerInputs {
+  bool components = false;  // diffuse.* and specular.*; else R G B
+  bool albedo = false, normal = false, coc = false, lens = false;
+  bool diffuseVariance = false, specularVariance = false, variance = false;
+  bool counts = false;  // samples
+  int spp = 0;          // fathom:spp; 0: unknown
+};
+
+LayerInputs findLayerInputs(std::span<const std::string> channels, const Attributes& attributes);
+
+// One line per thing that is missing and what the network takes instead, for an artist.
+std::vector<std::string> describeMissing(const LayerInputs& inputs);
+
+// Whether the network reads a channel of this name, given what the frame offers.
+bool layersRead(const LayerInputs& inputs, const std::string& channel);
+
+// What the whole frame decides.
+struct LayerScale {
+  float exposure = 1;  // see flat/neural_planes
+  float depth = 1;     // the mean by weight
+};
+
+// Made from the rows of a frame, in any pieces from the top.
+class LayerScaleSum {
+ public:
+  explicit LayerScaleSum(const Box& dataWindow);
+  // Throws Error by the name of a channel that is missing.
+  void add(const DeepImage& rows, const LayerInputs& inputs);
+  LayerScale result() const;
+
+ private:
+  Box dataWindow_;
+  Buffer<float> light_;  // [3][height][width]
+  double depth_ = 0, weight_ = 0;
+};
+
+// A row as the network takes it.
+struct LayerRow {
+  nn::SampleRow samples;
+  std::vector<uint64_t> places;  // of its samples, in the planes of the image
+  // Of each pixel the light of samples without alpha, R G B, as it comes through what is before them; and the nearest depth
+  // of any of these.
+  Buffer<float> emission, emissionDepth;
+  uint64_t nonFinite = 0;  // samples with alpha whose colour or depth is not finite
+};
+
+// Row y (of the data window's) of rows sorted front to back, which have the channels that `inputs` tells.
+LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerScale& scale, int y);
+
+}  // namespace fathom::deep

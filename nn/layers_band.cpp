@@ -1,0 +1,288 @@
+#include "nn/layers_band.h"
+
+#include <algorithm>
+#include <atomic>
+#include <stdexcept>
+
+#include "base/parallel.h"
+#include "nn/kernel_filter.h"
+
+namespace fathom::nn {
+
+namespace {
+
+Interval clipped(const Interval& rows, int height) {
+  return {std::max(rows.begin, 0), std::min(rows.end, height)};
+}
+
+Window scaled(const Window& window, int scale) {
+  return {window.x >> scale, window.y >> scale, window.width >> scale, window.height >> scale};
+}
+
+// The pixels of the samples of a chunk.
+std::vector<uint32_t> pixelsOf(const SampleRow& row, const SampleChunk& chunk, size_t firstPixel) {
+  std::vector<uint32_t> result(chunk.count);
+  size_t pixel = 0;
+  for (size_t i = 0; i < chunk.count; ++i) {
+    while (row.first[pixel + 1] <= chunk.begin + i) ++pixel;
+    result[i] = uint32_t(firstPixel + pixel);
+  }
+  return result;
+}
+
+}  // namespace
+
+LayersBand::LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int tile)
+    : net_(net),
+      height_(height),
+      width_(width),
+      tile_(tile),
+      rows_(rows),
+      sumRows_(clipped(rows.around(net.filterHalo()), height)),
+      meanRows_(clipped(sumRows_.around(net.meanHalo()), height)),
+      sums_(size_t(layers)) {
+  for (const int side : {height, width, rows.begin, rows.end})
+    if (side % LayersNet::kAlignment != 0 || side < 0) throw std::logic_error("sides are multiples of 4");
+  if (layers != 1 && layers != 2 && layers != 4) throw std::logic_error("layers are 1, 2 or 4");
+  const size_t pixels = size_t(meanHeight()) * size_t(width_);
+  mean_ = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
+  occupied_ = Buffer<uint8_t>(pixels, 0);
+}
+
+void LayersBand::addMeans(int y, const SampleRow& row) {
+  const size_t firstPixel = size_t(y - meanRows_.begin) * size_t(width_);
+  for (size_t x = 0; x + 1 < row.first.size(); ++x) occupied_[firstPixel + x] = row.first[x + 1] > row.first[x];
+  const size_t groupFloats = pixelFloats() * size_t(meanHeight()) * size_t(width_);
+  embedRow(net_, row, [&](const SampleChunk& chunk) {
+    const std::vector<uint32_t> pixels = pixelsOf(row, chunk, firstPixel);
+    addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), row.plane(kWeightInput) + chunk.begin,
+                pixels.data(), chunk.count, mean_.data(), groupFloats);
+  });
+}
+
+bool LayersBand::anySamples(const Window& window) const {
+  for (int y = window.y; y < window.y + window.height; ++y) {
+    const uint8_t* row = occupied_.data() + size_t(y - meanRows_.begin) * size_t(width_);
+    if (std::any_of(row + window.x, row + window.x + window.width, [](uint8_t o) { return o != 0; })) return true;
+  }
+  return false;
+}
+
+// `tile`: of the frame.
+void LayersBand::contextTile(const Window& tile) {
+  if (!anySamples(grown(tile, 2 * net_.filterHalo(), height_, width_))) return;
+  const Window from = grown(tile, net_.contextHalo(), height_, width_);
+  const size_t values = groups() * pixelFloats() * area(from);
+  Buffer<float> mean(values);
+  cropGroups(reinterpret_cast<const std::byte*>(mean_.data()), groups(), meanHeight(), width_,
+             pixelFloats() * sizeof(float), {from.x, from.y - meanRows_.begin, from.width, from.height},
+             reinterpret_cast<std::byte*>(mean.data()));
+  Buffer<std::byte> input(values * bytesOf(net_.element()));
+  toElements(mean.data(), values, net_.element(), input.data());
+  mean = {};
+  const auto plan = net_.context().plan(from.height, from.width);
+  Buffer<std::byte> arena(plan->layout().bytes);
+  const std::byte* inputs[] = {input.data()};
+  plan->run(inputs, arena.data());
+  const Window inside = {tile.x - from.x, tile.y - from.y, tile.width, tile.height};
+  const auto take = [&](Value value, int scale, Buffer<std::byte>& to) {
+    pasteGroups(Plan::result(*plan, arena.data(), value), groups(), from.height >> scale, from.width >> scale,
+                pixelBytes(), scaled(inside, scale), to.data(), sumHeight() >> scale, width_ >> scale, tile.x >> scale,
+                (tile.y - sumRows_.begin) >> scale);
+  };
+  take(net_.contextValues().partition, 0, partition_);
+  for (int i = 0; i < kLayerScales; ++i) take(net_.contextValues().kernel[i], i, kernel_[i]);
+}
+
+void LayersBand::makeContext(const Progress& progress) {
+  const size_t pixels = size_t(sumHeight()) * size_t(width_);
+  partition_ = Buffer<std::byte>(groups() * pixelBytes() * pixels, std::byte(0));
+  for (int i = 0; i < kLayerScales; ++i)
+    kernel_[i] = Buffer<std::byte>(groups() * pixelBytes() * (pixels >> 2 * i), std::byte(0));
+  const std::vector<Window> tiles = tilesOf(sumHeight(), width_, tile_);
+  Done done(double(std::max<size_t>(tiles.size(), 1)), progress);
+  parallelFor(0, int(tiles.size()), [&](int i) {
+    if (progress.stop.stop_requested()) throw Cancelled();
+    Window tile = tiles[size_t(i)];
+    tile.y += sumRows_.begin;
+    contextTile(tile);
+    done.add(1);
+  });
+  mean_ = {};
+  for (Sums& sums : sums_) {
+    sums.planes = Buffer<float>(kSplatted * pixels, 0.0f);
+    std::fill_n(sums.planes.data() + 4 * pixels, pixels, 1.0f);  // what misses everything passes all layers
+    sums.embedding = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
+  }
+}
+
+ContextRow LayersBand::contextRow(int y) const {
+  const size_t row = size_t(width_) * pixelBytes();
+  return {partition_.data() + size_t(y - sumRows_.begin) * row, size_t(sumHeight()) * row};
+}
+
+float* LayersBand::sumRow(int layer, size_t plane, int y) {
+  return sums_[size_t(layer)].planes.data() +
+         (plane * size_t(sumHeight()) + size_t(y - sumRows_.begin)) * size_t(width_);
+}
+
+void LayersBand::addSums(int y, const SampleRow& row) {
+  const size_t firstPixel = size_t(y - sumRows_.begin) * size_t(width_);
+  const size_t groupFloats = pixelFloats() * size_t(sumHeight()) * size_t(width_);
+  std::vector<float> weight;
+  shareRow(net_, row, contextRow(y), layers(), [&](const SampleChunk& chunk) {
+    const std::vector<uint32_t> pixels = pixelsOf(row, chunk, firstPixel);
+    weight.resize(chunk.count);
+    for (int l = 0; l < layers(); ++l) {
+      const float* share = chunk.shares + size_t(l) * chunk.shareStride;
+      float* planes = sums_[size_t(l)].planes.data();
+      const size_t plane = size_t(sumHeight()) * size_t(width_);
+      for (size_t i = 0; i < chunk.count; ++i) {
+        const size_t s = chunk.begin + i;
+        const float w = weight[i] = row.plane(kWeightInput)[s] * share[i];
+        float* to = planes + pixels[i];
+        for (size_t c = 0; c < 3; ++c) to[c * plane] += w * row.plane(kExposedAt + c)[s];
+        to[3 * plane] += w;
+        to[5 * plane] += w * row.plane(kSampleDepth)[s];
+      }
+      addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), weight.data(), pixels.data(),
+                  chunk.count, sums_[size_t(l)].embedding.data(), groupFloats);
+    }
+  });
+  finishOccupancy(y);
+}
+
+// What reaches a layer: all but what the layers before it hold, summed from behind, so that it is never less than its own.
+void LayersBand::finishOccupancy(int y) {
+  for (int x = 0; x < width_; ++x) {
+    float all = 0;
+    for (int l = 0; l < layers(); ++l) all += sumRow(l, 3, y)[x];
+    float reaching = std::max(0.0f, 1 - all);
+    for (int l = layers(); l-- > 0;) sumRow(l, 4, y)[x] = reaching += sumRow(l, 3, y)[x];
+  }
+}
+
+// Layers of one tile.
+class LayersBand::TileFilter {
+ public:
+  TileFilter(LayersBand& band, const Window& tile)
+      : band_(band), net_(band.net_), tile_(tile), from_(grown(tile, net_.filterHalo(), band.height_, band.width_)) {}
+
+  // False where there is nothing in the layer.
+  bool run(int layer) {
+    if (!anyWeight(layer)) return false;
+    shrink(layer);
+    for (int i = 0; i < kLayerScales; ++i) filter(i);
+    join();
+    float* to = band_.results_[size_t(layer)].data();
+    const size_t rows = size_t(band_.rows_.end - band_.rows_.begin);
+    for (size_t p = 0; p < kLayerPlanes; ++p)
+      for (int y = tile_.y; y < tile_.y + tile_.height; ++y)
+        std::copy_n(joined_.row(p, y - from_.y) + tile_.x - from_.x, tile_.width,
+                    to + (p * rows + size_t(y - band_.rows_.begin)) * size_t(band_.width_) + tile_.x);
+    return true;
+  }
+
+ private:
+  bool anyWeight(int layer) const {
+    for (int y = from_.y; y < from_.y + from_.height; ++y) {
+      const float* row = band_.sumRow(layer, 3, y) + from_.x;
+      if (std::any_of(row, row + from_.width, [](float w) { return w != 0; })) return true;
+    }
+    return false;
+  }
+
+  Window insideBand() const { return {from_.x, from_.y - band_.sumRows_.begin, from_.width, from_.height}; }
+
+  // What is splatted, and embeddings, at all scales.
+  void shrink(int layer) {
+    const int groups = int(band_.groups()), block = net_.block();
+    for (int i = 0; i < kLayerScales; ++i) {
+      const int height = from_.height >> i, width = from_.width >> i;
+      values_[i].resize(kSplatted, height, width);
+      embedding_[i] = Buffer<float>(size_t(groups * block) * size_t(height) * size_t(width));
+      if (i == 0) {
+        for (size_t p = 0; p < kSplatted; ++p)
+          for (int y = 0; y < height; ++y)
+            std::copy_n(band_.sumRow(layer, p, from_.y + y) + from_.x, width, values_[0].row(p, y));
+        cropGroups(reinterpret_cast<const std::byte*>(band_.sums_[size_t(layer)].embedding.data()), size_t(groups),
+                   band_.sumHeight(), band_.width_, size_t(block) * sizeof(float), insideBand(),
+                   reinterpret_cast<std::byte*>(embedding_[0].data()));
+      } else {
+        halve(std::as_const(values_[i - 1]).planes(kSplatted), 2 * height, 2 * width, values_[i].planes(kSplatted));
+        halveGroups(embedding_[i - 1].data(), groups, 2 * height, 2 * width, block, embedding_[i].data());
+      }
+      values_[i].clearBorders();
+    }
+  }
+
+  void filter(int i) {
+    const int height = from_.height >> i, width = from_.width >> i;
+    const auto plan = net_.kernel(i).plan(height, width);
+    Buffer<std::byte> arena(plan->layout().bytes), input(embedding_[i].size() * bytesOf(net_.element())),
+        context(input.size());
+    toElements(embedding_[i].data(), embedding_[i].size(), net_.element(), input.data());
+    cropGroups(band_.kernel_[i].data(), band_.groups(), band_.sumHeight() >> i, band_.width_ >> i, band_.pixelBytes(),
+               scaled(insideBand(), i), context.data());
+    const std::byte* inputs[] = {input.data(), context.data()};
+    plan->run(inputs, arena.data());
+    const std::byte* logits = Plan::result(*plan, arena.data(), net_.kernelValues(i).logits);
+    splat(reinterpret_cast<const float*>(logits), net_.block(), values_[i], splatted_[i], i ? nullptr : &shares_);
+  }
+
+  void join() {
+    const std::vector<float> ones(size_t(from_.width), 1.0f);
+    scaleRows(shares_, splatted_[0], joined_);
+    const auto enlarge = [](WidePlanes& to, const float* factor, ptrdiff_t stride, const WidePlanes& from) {
+      addEnlarged(to.planes(kLayerPlanes), to.height(), to.width(), factor, stride, from.planes(kLayerPlanes));
+    };
+    enlarge(joined_, shares_.row(1, 0), shares_.stride(), splatted_[1]);
+    half_.resize(kLayerPlanes, from_.height / 2, from_.width / 2);
+    for (size_t p = 0; p < kLayerPlanes; ++p)
+      for (int y = 0; y < half_.height(); ++y) std::fill_n(half_.row(p, y), half_.width(), 0.0f);
+    enlarge(half_, ones.data(), 0, splatted_[2]);
+    enlarge(joined_, shares_.row(2, 0), shares_.stride(), half_);
+  }
+
+  LayersBand& band_;
+  const LayersNet& net_;
+  const Window tile_, from_;
+  WidePlanes values_[kLayerScales], splatted_[kLayerScales], shares_, half_, joined_;
+  Buffer<float> embedding_[kLayerScales];
+};
+
+void LayersBand::filter(const Progress& progress) {
+  const int height = rows_.end - rows_.begin;
+  results_.clear();
+  for (int l = 0; l < layers(); ++l) results_.emplace_back(kLayerPlanes * size_t(height) * size_t(width_), 0.0f);
+  const std::vector<Window> tiles = tilesOf(height, width_, tile_);
+  std::atomic<size_t> filtered = 0;
+  Done done(double(std::max<size_t>(tiles.size(), 1)), progress);
+  parallelFor(0, int(tiles.size()), [&](int i) {
+    if (progress.stop.stop_requested()) throw Cancelled();
+    Window tile = tiles[size_t(i)];
+    tile.y += rows_.begin;
+    TileFilter one(*this, tile);
+    for (int l = 0; l < layers(); ++l) filtered += one.run(l);
+    done.add(1);
+  });
+  filtered_ = filtered;
+  skipped_ = tiles.size() * size_t(layers()) - filtered;
+}
+
+const float* LayersBand::row(int layer, size_t plane, int y) const {
+  return results_[size_t(layer)].data() +
+         (plane * size_t(rows_.end - rows_.begin) + size_t(y - rows_.begin)) * size_t(width_);
+}
+
+Buffer<float> LayersBand::shares(int y, const SampleRow& row) const {
+  Buffer<float> result(size_t(layers()) * row.count());
+  shareRow(net_, row, contextRow(y), layers(), [&](const SampleChunk& chunk) {
+    for (int l = 0; l < layers(); ++l)
+      std::copy_n(chunk.shares + size_t(l) * chunk.shareStride, chunk.count,
+                  result.data() + size_t(l) * row.count() + chunk.begin);
+  });
+  return result;
+}
+
+}  // namespace fathom::nn

@@ -1,0 +1,303 @@
+// The layered network on deep frames, with random weights: what it reads, what it is made into, and what must not matter.
+#include "deep/layers.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+
+#include "base/error.h"
+#include "deep/flatten.h"
+#include "deep/layers_results.h"
+#include "tests/reference/deep_samples.h"
+#include "tests/reference/layered.h"
+#include "tests/reference/noisy_frame.h"
+
+namespace fathom::deep {
+namespace {
+
+nn::LayersNet randomNet() {
+  return nn::LayersNet(nn::readWeights(reference::safetensors(reference::randomLayered(16, 4)), "random"));
+}
+
+struct Results {
+  flat::Image flat;
+  DeepImage layers, bins;
+  LayersCounts counts;
+};
+
+// A frame in one band.
+Results run(const DeepImage& image, LayersParams params = {}) {
+  static const nn::LayersNet net = randomNet();
+  Results results;
+  const LayerSource source = layerSource(image);
+  const LayerScale scale = measureLayers(source, params);
+  denoiseLayers(
+      net, params, source, scale, image.dataWindow.y0, image.dataWindow.y1,
+      [&](const LayeredRows& rows) {
+        results.flat = flattenedLayers(rows);
+        results.layers = layersImage(rows, image.attributes);
+        results.bins = inLayerColours(image.copy(), rows, source.inputs);
+      },
+      {}, &results.counts);
+  return results;
+}
+
+// A frame in the bands that a memory limit asks for.
+flat::Image banded(const DeepImage& image, const LayersParams& params, size_t& bands) {
+  static const nn::LayersNet net = randomNet();
+  flat::Image result{image.dataWindow, image.displayWindow, {}, {}};
+  for (const char* name : {"R", "G", "B", "A"}) result.add(name);
+  const LayerSource source = layerSource(image);
+  bands = 0;
+  denoiseLayers(net, params, source, measureLayers(source, params), image.dataWindow.y0, image.dataWindow.y1,
+                [&](const LayeredRows& rows) {
+                  const flat::Image part = flattenedLayers(rows);
+                  for (size_t p = 0; p < 4; ++p)
+                    std::ranges::copy(part.planes[p].values, result.planes[p].values.data() +
+                                                                 image.dataWindow.index(image.dataWindow.x0, rows.y0));
+                  ++bands;
+                });
+  return result;
+}
+
+void expectNear(const flat::Image& a, const flat::Image& b, float bound) {
+  for (const char* name : {"R", "G", "B", "A"}) {
+    const Buffer<float>&x = a.get(name).values, &y = b.get(name).values;
+    ASSERT_EQ(x.size(), y.size());
+    float most = 0;
+    for (const float v : y) most = std::max(most, std::fabs(v));
+    for (size_t i = 0; i < x.size(); ++i) ASSERT_NEAR(x[i], y[i], bound * most) << name << " " << i;
+  }
+}
+
+TEST(Layers, FlattenToTheResult) {
+  const DeepImage image = reference::makeNoisyFrame(37, 30, 1);
+  for (const int layers : {1, 2, 4}) {
+    const Results results = run(image, {.layers = layers});
+    expectNear(flatten(results.layers), results.flat, 1e-6f);
+    EXPECT_EQ(results.layers.dataWindow, image.dataWindow);
+    const std::span<const float> z = std::as_const(results.layers).get("Z"), a = std::as_const(results.layers).get("A");
+    size_t most = 0;
+    for (size_t i = 0; i < results.layers.pixels(); ++i) {
+      most = std::max(most, results.layers.count(i));
+      for (uint64_t s = results.layers.offsets[i]; s < results.layers.offsets[i + 1]; ++s) {
+        ASSERT_TRUE(a[s] >= 0 && a[s] <= 1);
+        ASSERT_TRUE(z[s] > 1.9f && z[s] < 5.5f) << z[s];
+        if (s > results.layers.offsets[i]) {
+          ASSERT_LT(z[s - 1], z[s]);
+        }
+      }
+    }
+    EXPECT_EQ(most, size_t(layers));
+    EXPECT_FALSE(results.layers.attributes.getInt("fathom:spp"));
+    EXPECT_EQ(results.layers.attributes.getString("artist"), "nobody");
+  }
+}
+
+TEST(Layers, ABrighterFrameIsDenoisedAlike) {
+  const DeepImage image = reference::makeNoisyFrame(32, 24, 1);
+  DeepImage bright = image.copy();
+  for (Channel& channel : bright.channels) {
+    const bool light = channel.name.size() == 1 ? channel.name != "A" && channel.name != "Z"
+                                                : channel.name.find("diffuse.") != std::string::npos ||
+                                                      channel.name.find("specular.") != std::string::npos;
+    const bool variance =
+        channel.name.starts_with("variance.") && channel.name.size() == 10 && channel.name != "variance.Z";
+    for (float& v : channel.values) v *= light ? 4.0f : variance ? 16.0f : 1.0f;
+  }
+  const flat::Image expected = run(image).flat;
+  flat::Image result = run(bright).flat;
+  for (size_t c = 0; c < 3; ++c)
+    for (float& v : result.planes[c].values) v /= 4;
+  expectNear(result, expected, 1e-4f);
+}
+
+TEST(Layers, MemoryDoesNotChangeTheResult) {
+  const DeepImage image = reference::makeNoisyFrame(44, 203, 1);
+  const nn::LayersNet net = randomNet();
+  const size_t least = leastLayersBytes(net, 2, image.dataWindow);
+  size_t one = 0, few = 0, many = 0;
+  const flat::Image expected = banded(image, {}, one);
+  expectNear(banded(image, {.memory = least + least / 8}, few), expected, 1e-5f);
+  expectNear(banded(image, {.memory = least}, many), expected, 1e-5f);
+  EXPECT_EQ(one, 1U);
+  EXPECT_GT(few, 1U);
+  EXPECT_GT(many, few);
+  EXPECT_EQ(layersBands(net, {.memory = least}, image.dataWindow).size(), many);
+  EXPECT_LE(least, mostLayersBytes(net, 2, image.dataWindow));
+  EXPECT_THROW(banded(image, {.memory = least / 2}, few), Error);
+}
+
+TEST(Layers, SamplesWithoutAlphaPassThroughWhatIsBeforeThem) {
+  const auto withLight = [&](bool light) {
+    DeepImage glow = reference::makeDeep(
+        {{{1, 1, 0}, {2, 2, 0.25f}, {2.5f, 2.5f, 0}, {3, 3, 1}}, {{2, 2, 1}, {3, 3, 0}}, {{7, 7, 0}}, {{4, 4, 0.5f}}},
+        4);
+    for (const char* name : {"R", "G", "B"}) {
+      Buffer<float>& values = glow.find(name) ? glow.find(name)->values : glow.add(name, PixelType::Float).values;
+      const std::span<const float> alpha = glow.get("A");
+      for (size_t i = 0; i < alpha.size(); ++i) values[i] = alpha[i] > 0 ? alpha[i] * 0.5f : light ? 8.0f : 0.0f;
+    }
+    return glow;
+  };
+  const Results dark = run(withLight(false)), lit = run(withLight(true));
+  const float expected[] = {8 + 0.75f * 8, 0, 8, 0};
+  for (size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(lit.flat.planes[0].values[i] - dark.flat.planes[0].values[i], expected[i], 1e-5) << i;
+  EXPECT_EQ(lit.flat.planes[3].values[2], dark.flat.planes[3].values[2]);
+  expectNear(flatten(lit.layers), lit.flat, 1e-5f);
+  // In bins they keep their colours.
+  EXPECT_EQ(lit.bins.get("R")[0], 8);
+  EXPECT_EQ(lit.bins.get("R")[2], 8);
+}
+
+TEST(Layers, PoisonedSamplesHaveNoSay) {
+  const DeepImage image = reference::makeNoisyFrame(24, 20, 1);
+  const float bad[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e20f};
+  std::optional<flat::Image> first;
+  for (const float value : bad)
+    for (const char* name : {"diffuse.G", "specular.R", "Z"}) {
+      DeepImage poisoned = image.copy();
+      poisoned.get(name)[300] = value;
+      const Results results = run(poisoned);
+      EXPECT_EQ(results.counts.nonFinite, 1U);
+      for (const flat::Plane& plane : results.flat.planes)
+        for (const float v : plane.values) ASSERT_TRUE(std::isfinite(v)) << plane.name;
+      for (const float v : results.bins.get("R")) ASSERT_TRUE(std::isfinite(v));
+      // All that is wrong with it does not matter.
+      if (first) expectNear(results.flat, *first, 1e-6f);
+      first = results.flat.copy();
+    }
+  DeepImage features = image.copy();
+  for (const char* name : {"albedo.R", "N.X", "variance.R", "samples"}) features.get(name)[300] = bad[0];
+  const Results results = run(features);
+  EXPECT_EQ(results.counts.nonFinite, 0U);
+  for (const flat::Plane& plane : results.flat.planes)
+    for (const float v : plane.values) ASSERT_TRUE(std::isfinite(v)) << plane.name;
+}
+
+TEST(Layers, BinsGetTheColoursOfTheirLayers) {
+  const DeepImage image = reference::makeNoisyFrame(24, 20, 1);
+  const Results one = run(image, {.layers = 1});
+  // Of one layer, all bins of a pixel have its colour.
+  for (size_t i = 0; i < image.pixels(); ++i)
+    for (uint64_t s = image.offsets[i]; s < image.offsets[i + 1]; ++s)
+      ASSERT_NEAR(one.bins.get("R")[s] * one.flat.planes[3].values[i], image.get("A")[s] * one.flat.planes[0].values[i],
+                  1e-5);
+  const Results two = run(image, {.layers = 2});
+  for (const char* kept : {"A", "Z", "albedo.R", "crypto"}) {
+    const std::span<const float> a = std::as_const(two.bins).get(kept), b = image.get(kept);
+    EXPECT_TRUE(std::ranges::equal(a, b)) << kept;
+  }
+  EXPECT_TRUE(two.bins.find("id"));
+  for (const char* gone : {"diffuse.R", "specular.G", "variance.B", "half0.R", "samples"})
+    EXPECT_FALSE(two.bins.find(gone)) << gone;
+}
+
+TEST(Layers, AnEmptyFrameIsEmpty) {
+  const DeepImage image = reference::makeDeep({{}, {}, {}}, 3);
+  DeepImage empty = image.copy();
+  for (const char* name : {"R", "G", "B"})
+    if (!empty.find(name)) empty.add(name, PixelType::Float);
+  const Results results = run(empty);
+  EXPECT_EQ(results.layers.samples(), 0U);
+  for (const flat::Plane& plane : results.flat.planes)
+    for (const float v : plane.values) EXPECT_EQ(v, 0);
+}
+
+TEST(LayerSamples, SayWhatIsMissing) {
+  const auto missing = [](std::vector<std::string> names, int spp) {
+    Attributes attributes;
+    if (spp) attributes.set("fathom:spp", spp);
+    return describeMissing(findLayerInputs(names, attributes));
+  };
+  EXPECT_THAT(missing({"A", "B", "G", "R", "Z"}, 0),
+              testing::ElementsAre("no diffuse.* and specular.*: all light is taken for one kind",
+                                   "no albedo.* or N.*: the network has less to go by",
+                                   "no samples and no fathom:spp: each deep sample is taken for one camera sample"));
+  EXPECT_THAT(missing({"diffuse.R", "diffuse.G", "diffuse.B", "specular.R", "specular.G", "specular.B", "albedo.R",
+                       "albedo.G", "albedo.B"},
+                      8),
+              testing::ElementsAre("no N.*: the network has less to go by"));
+  const LayerInputs all = findLayerInputs(
+      std::vector<std::string>{"diffuse.R", "diffuse.G", "diffuse.B", "specular.R", "specular.G", "specular.B"}, {});
+  EXPECT_TRUE(layersRead(all, "diffuse.R") && layersRead(all, "A") && layersRead(all, "samples"));
+  EXPECT_FALSE(layersRead(all, "R") || layersRead(all, "half0.R") || layersRead(all, "variance.N.X"));
+}
+
+// The same from R G B A Z alone, and a known input.
+TEST(LayerSamples, TakeWhatThereIs) {
+  DeepImage image = reference::makeDeep({{{2, 2, 0.25f}, {6, 6, 1}}, {{4, 4, 0.5f}}}, 2);
+  for (const char* name : {"R", "G", "B"}) {
+    Buffer<float>& values = image.find(name) ? image.find(name)->values : image.add(name, PixelType::Float).values;
+    values[0] = 0.25f * 3, values[1] = 1, values[2] = 0.5f * 2;
+  }
+  const LayerSource source = layerSource(image);
+  const LayerScale scale = measureLayers(source, {});
+  EXPECT_NEAR(scale.depth, (0.25 * 2 + 0.75 * 6 + 0.5 * 4) / 1.5, 1e-6);
+  const LayerRow row = layerRow(image, source.inputs, {2, scale.depth}, image.dataWindow.y0);
+  ASSERT_EQ(row.samples.count(), 3U);
+  EXPECT_THAT(row.samples.first, testing::ElementsAre(0, 2, 3));
+  const auto at = [&](size_t plane, size_t sample) { return row.samples.plane(plane)[sample]; };
+  EXPECT_EQ(at(0, 0), 0);
+  EXPECT_NEAR(at(4, 0), std::log(1 + 2 * 3.0), 1e-6);
+  EXPECT_EQ(at(6, 0), 0.5f);
+  EXPECT_EQ(at(9, 0), 0);
+  EXPECT_NEAR(at(12, 1), 6 / (6 + scale.depth), 1e-6);
+  EXPECT_EQ(at(16, 1), 0.75f);
+  EXPECT_EQ(at(17, 1), 0);
+  EXPECT_NEAR(at(19, 1), 1 / 8.0, 1e-6);
+  EXPECT_EQ(at(nn::kExposedAt + 2, 0), 6);
+  EXPECT_EQ(at(nn::kSampleDepth, 2), 4);
+}
+
+// FATHOM_LAYERS_GOLDEN: see tests/nn/layers_golden_test.cpp.
+TEST(LayerSamples, EqualsItsTraining) {
+  const char* given = std::getenv("FATHOM_LAYERS_GOLDEN");
+  const std::string folder = given ? given : "";
+  if (folder.empty() || !std::filesystem::exists(folder + "/layers_golden.safetensors"))
+    GTEST_SKIP() << "skipped: FATHOM_LAYERS_GOLDEN names no folder with layers_golden.safetensors";
+  const nn::LayersNet net(nn::readWeights(folder + "/layers.safetensors"));
+  const nn::WeightFile golden = nn::readWeights(folder + "/layers_golden.safetensors");
+  const auto values = [&](const std::string& name) -> const Buffer<float>& { return golden.tensors.at(name).values; };
+  const auto& shape = golden.tensors.at("counts").shape;
+  DeepImage image;
+  image.dataWindow = image.displayWindow = {0, 0, int(shape[1]), int(shape[0])};
+  image.offsets = Buffer<uint64_t>(image.pixels() + 1, uint64_t(0));
+  for (size_t i = 0; i < image.pixels(); ++i) image.offsets[i + 1] = image.offsets[i] + uint64_t(values("counts")[i]);
+  for (const auto& [name, tensor] : golden.tensors)
+    if (tensor.values.size() == image.samples() && name != "weight" && !name.starts_with("partition"))
+      image.channels.push_back({name, PixelType::Float, tensor.values.copy(), {}});
+  const LayerSource source = layerSource(image);
+  const LayerScale scale = measureLayers(source, {});
+  EXPECT_NEAR(scale.exposure / values("exposure")[0], 1, 1e-5);
+  EXPECT_NEAR(scale.depth / values("depth")[0], 1, 1e-5);
+  size_t next = 0;
+  for (int y = 0; y < image.dataWindow.y1; ++y) {
+    const LayerRow row = layerRow(image, source.inputs, scale, y);
+    for (size_t s = 0; s < row.samples.count(); ++s, ++next) {
+      for (size_t p = 0; p < nn::kSampleInputs; ++p)
+        ASSERT_NEAR(row.samples.plane(p)[s], values("inputs")[next * nn::kSampleInputs + p], 1e-5) << p << ", " << next;
+      for (size_t c = 0; c < 3; ++c)
+        ASSERT_NEAR(row.samples.plane(nn::kExposedAt + c)[s], values("light")[next * 3 + c], 1e-4) << next;
+    }
+  }
+  EXPECT_EQ(next, image.samples());
+  for (const int layers : {1, 2, 4})
+    denoiseLayers(net, {.layers = layers}, source, scale, 0, image.dataWindow.y1, [&](const LayeredRows& rows) {
+      const flat::Image result = flattenedLayers(rows);
+      const Buffer<float>&colour = values("colour" + std::to_string(layers)),
+            &alpha = values("alpha" + std::to_string(layers));
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t i = 0; i < image.pixels(); ++i)
+          ASSERT_NEAR(result.planes[c].values[i] * scale.exposure, colour[c * image.pixels() + i], 3e-4) << layers;
+      for (size_t i = 0; i < image.pixels(); ++i) ASSERT_NEAR(result.planes[3].values[i], alpha[i], 1e-4);
+    });
+}
+
+}  // namespace
+}  // namespace fathom::deep
