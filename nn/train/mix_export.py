@@ -64,16 +64,14 @@ def card(name, model, saved, rows, words):
         f" {len(saved['scenes'])} scenes: {', '.join(saved['scenes'])}.",
         f"- Limits: {LIMITS}",
         "",
-        "relMSE of frames that its training has not seen, less the reference's own error, over that of Open Image Denoise with"
-        " prefiltered guides: of the best of the denoisers, of the mix without the network, and with it (training's own"
-        " figures, where the gate is an approximation: docs/notes.md has the program's).",
+        "relMSE of frames that its training has not seen, less the reference's own error: of the best of the denoisers, of the"
+        " mix without the network, and with it (training's own figures, where the gate is an approximation).",
         "",
         "| frame | denoisers | best | rule | mix |",
         "|---|---|---|---|---|",
     ]
-    of_oidn = {row["frame"]: float(row["best"]) for row in rows if row["bases"] == "oidn"}
     for row in rows:
-        figures = " | ".join(f"{float(row[x]) / of_oidn[row['frame']]:.3f}" for x in ("best", "rule", "mix"))
+        figures = " | ".join(f"{float(row[x]):.5f}" for x in ("best", "rule", "mix"))
         lines.append(f"| {row['frame']} | {row['bases'].replace('+', ', ')} | {figures} |")
     return "\n".join(lines) + "\n"
 

@@ -226,6 +226,7 @@ class Training:
     def validate(self):
         rows, ratios = [], {}
         for frame in self.kept:
+            # Of the denoisers alone; ratios are taken to the best of them.
             singles = {base: relmse(frame.layers["y"][frame.bases.index(base)], frame) for base in frame.bases}
             for count in range(1, len(frame.bases) + 1):
                 for bases in itertools.combinations(frame.bases, count):
@@ -234,13 +235,13 @@ class Training:
                     name = "+".join(bases)
                     rows.append([self.step, f"{self.hours:.4f}", frame.pair.name, name, *(f"{x:.6f}" for x in figures)])
                     ours = frame.pair.scene in frames.HELD_OUT
-                    ratios.setdefault((ours, name), []).append([x / singles["oidn"] for x in figures])
+                    ratios.setdefault((ours, name), []).append([x / min(singles.values()) for x in figures])
         path = self.settings.out / "log.csv"
         fresh = not path.exists()
         with open(path, "a", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerows([COLUMNS] * fresh + rows)
-        print(f"step {self.step}, {self.hours:.2f} hours; over oidn: best, rule, mix")
+        print(f"step {self.step}, {self.hours:.2f} hours; over the best denoiser: best of these, rule, mix")
         for (ours, name), values in sorted(ratios.items()):
             print("  held out" if ours else "  random  ", f"{name:16}", *(f"{x:.3f}" for x in np.mean(values, 0)), flush=True)
 

@@ -26,9 +26,12 @@ import evaluate
 import export
 import golden
 import mix_export
+import mix_train
 import train
 from blocks import NAMES
+from exr import read, write
 from frames import find
+from mix_candidates import candidates_of
 from mix_model import Mix
 from model import COMPONENTS, Compositional
 from weights import load_model, read_tensors, write_tensors
@@ -120,6 +123,40 @@ def check_mix(folder):
     write_tensors(folder / "mix_golden.safetensors", tensors)
 
 
+def write_candidates(folder, data, bases=("nlm", "oidn")):
+    """Means over 3x3 and 5x5 pixels, with estimates of a kind, as `fathom progressive --candidates` writes them."""
+    for pair in find([data]):
+        noisy, channels = read(pair.noisy)[0], {}
+        for radius, base in enumerate(bases, 1):
+            for c in "RGB":
+                padded = np.pad(noisy[c], radius, mode="edge")
+                taps = [np.roll(padded, (y, x), (0, 1)) for y in range(2 * radius + 1) for x in range(2 * radius + 1)]
+                channels[f"{base}.{c}"] = np.mean(taps, 0)[2 * radius :, 2 * radius :]
+                for what, part in (("error", 0.3), ("variance", 1), ("covariance", 0.1), ("spread", 0.1)):
+                    channels[f"{base}.{what}.{c}"] = part * noisy[f"variance.{c}"]
+            channels[f"{base}.gate"] = np.zeros_like(noisy["R"])
+        out = candidates_of(folder, pair)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write(out, channels)
+
+
+def check_mix_training(folder, data):
+    """From candidates to weights and card; the mixing network starts as the rule and leaves it."""
+    write_candidates(folder / "candidates", data)
+    places = ["--data", str(data), "--candidates", str(folder / "candidates"), "--out", str(folder / "mixing")]
+    mix_train.main([*places, *"--steps 40 --validate 20 --crop 32 --batch 2 --rate 3e-3".split()])
+    with open(folder / "mixing/log.csv", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["bases"] == "nlm+oidn"]
+    expect({row["frame"].split("/")[0] for row in rows} == {"coffee"}, "mix, held-out frames: expected those of coffee")
+    last = [row for row in rows if row["step"] == "40"]
+    expect(all(float(row["rule"]) > 0 for row in last), "mix: expected errors above 0")
+    expect(any(row["mix"] != row["rule"] for row in last), "mix: expected a network that changes the rule")
+    mix_export.main([str(folder / "mixing"), str(folder / "mixed.safetensors")])
+    expect("coffee" in (folder / "mixed.md").read_text(), "mix, card: expected the held-out frames")
+    saved = torch.load(folder / "mixing/checkpoint.pt")["average"]
+    expect(same(dict(mix_export.load(folder / "mixed.safetensors").state_dict()), dict(saved)), "mix: expected its weights")
+
+
 def check_golden(folder):
     golden.main([str(folder / "tiny.safetensors"), str(folder / "golden.safetensors")])
     found, _ = read_tensors(folder / "golden.safetensors")
@@ -139,6 +176,7 @@ def main():
     check_weights(folder)
     check_golden(folder)
     check_mix(folder)
+    check_mix_training(folder, folder / "frames")
     curve.main([str(folder / "straight/log.csv"), str(folder / "curve.svg")])
     evaluate.main([str(folder / "tiny.safetensors"), str(folder / "frames"), "--out", str(folder / "pictures")])
 
