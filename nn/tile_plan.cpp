@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <tuple>
 
 #include "base/parallel.h"
 #include "nn/tile_work.h"
@@ -45,7 +46,9 @@ struct Blocks {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 
   bool empty() const { return x0 >= x1 || y0 >= y1; }
-  auto operator<=>(const Blocks&) const = default;
+  bool operator<(const Blocks& other) const {
+    return std::tie(x0, y0, x1, y1) < std::tie(other.x0, other.y0, other.x1, other.y1);
+  }
 };
 
 // A part of a frame and what its blocks are worth; finds the cheapest way to cut it.
