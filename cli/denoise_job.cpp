@@ -256,7 +256,8 @@ void setBudget(SequencePlan& plan, DenoiseRequest& request, const Sequence& sequ
 // Whether the layered network is asked for, for all of the work or as a guide; and what does not go with it.
 bool wantsLayers(const DenoiseRequest& request) {
   const bool alone = request.base.name == kLayersBase && request.layers.output != LayersOutput::Bins;
-  if (!alone && guideChoice(request) != kLayersBase) return false;
+  const bool guides = request.guide == kLayersBase || (request.guide == "auto" && request.base.name == kLayersBase);
+  if (!alone && !guides) return false;
   if (request.timeBudget) usage("--time-budget", "expected another method than layers, whose work is not measured");
   if (request.errors) usage("--error", "expected another method than layers, whose errors nothing tells");
   if (alone && request.split) usage("--split", "expected --as bins: layers have no components");

@@ -103,7 +103,7 @@ TEST_F(MixCommand, DenoiseMixesAndTellsTheErrors) {
 }
 
 TEST_F(MixCommand, RefusesWhatCannotBeMixed) {
-  for (const auto& [options, text] : {std::pair("--method nlm,auto", "expected nlm, neural and oidn, or auto alone"),
+  for (const auto& [options, text] : {std::pair("--method nlm,auto", "expected nlm, neural and oidn, or auto or layers alone"),
                                       {"--method nlm,nlm", "expected nlm once"},
                                       {"--method nlm,other", "found other"},
                                       {"--method nlm,neural --mix half", "--mix"}}) {
