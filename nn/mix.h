@@ -53,7 +53,7 @@ class MixNet {
 
   Value features_, weight_, share_;
   std::unique_ptr<const Module> unet_, head_, shareHead_;
-  int halo_ = 0, width_ = 0;
+  int halo_ = 0;
 };
 
 }  // namespace fathom::nn
