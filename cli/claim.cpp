@@ -15,6 +15,10 @@ namespace fathom::cli {
 
 namespace {
 
+std::string claimOn(const std::vector<std::string>& outputs) {
+  return fmt::format("{}.claim", outputs.front());
+}
+
 // Whether the file at `path` is still the one that was opened: its last owner may have removed it meanwhile.
 bool isThere(const std::string& path, int fd) {
   struct stat opened, there;
@@ -24,19 +28,20 @@ bool isThere(const std::string& path, int fd) {
 
 }  // namespace
 
-std::shared_ptr<const Claim> Claim::take(const std::string& output) {
-  std::string path = fmt::format("{}.claim", output);
+std::shared_ptr<const Claim> Claim::take(const std::vector<std::string>& outputs) {
+  std::string path = claimOn(outputs);
   while (true) {
+    const bool left = ::access(path.c_str(), F_OK) == 0;
     const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd < 0) fail("{}: cannot write: {}", output, std::strerror(errno));
+    if (fd < 0) fail("{}: cannot write: {}", outputs.front(), std::strerror(errno));
     struct flock lock {};
     lock.l_type = F_WRLCK;
     lock.l_whence = SEEK_SET;
-    const bool locked = ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
-    const bool refused = !locked && (errno == EAGAIN || errno == EACCES);
+    const bool refused = ::fcntl(fd, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES);
     if (!refused && isThere(path, fd)) {
-      std::shared_ptr<const Claim> claim(new Claim(std::move(path), fd, locked));
-      removeAbandoned(output);
+      std::shared_ptr<const Claim> claim(new Claim(std::move(path), fd));
+      if (left)  // by a process that is no more
+        for (const std::string& output : outputs) removeAbandoned(output);
       return claim;
     }
     ::close(fd);
@@ -44,8 +49,8 @@ std::shared_ptr<const Claim> Claim::take(const std::string& output) {
   }
 }
 
-void Claim::clear(const std::string& output) {
-  if (::access(fmt::format("{}.claim", output).c_str(), F_OK) == 0) take(output);
+void Claim::clear(const std::vector<std::string>& outputs) {
+  if (::access(claimOn(outputs).c_str(), F_OK) == 0) take(outputs);
 }
 
 Claim::~Claim() {

@@ -6,32 +6,31 @@
 
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace fathom::cli {
 
 class Claim {
  public:
-  // Null where another process has it. Whoever gets a claim looks again whether the output is there: another one may have
-  // made it in between. What a killed process left half written beside the output is removed. Throws an Error where nothing
-  // can be written there.
-  static std::shared_ptr<const Claim> take(const std::string& output);
+  // On all outputs of a frame, by the lock on the first. Null where another process has it. Whoever gets a claim looks again
+  // whether the outputs are there: another one may have made them in between. What a killed process left half written
+  // beside them is removed. On file systems that lock nothing, everybody gets it: two processes may then make the same
+  // frame, each of them whole. Throws an Error where nothing can be written there.
+  static std::shared_ptr<const Claim> take(const std::vector<std::string>& outputs);
 
-  // Of an output that is done: removes the claim of a process that was killed just before it did so itself.
-  static void clear(const std::string& output);
+  // Of outputs that are done: removes the claim of a process that was killed just before it did so itself.
+  static void clear(const std::vector<std::string>& outputs);
 
   Claim(const Claim&) = delete;
   Claim& operator=(const Claim&) = delete;
   ~Claim();
 
-  // False on file systems that lock nothing: there, two processes may make the same frame, each of them whole.
-  bool exclusive() const { return exclusive_; }
-
  private:
-  Claim(std::string path, int fd, bool exclusive) : path_(std::move(path)), fd_(fd), exclusive_(exclusive) {}
+  Claim(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
 
   std::string path_;
   int fd_;
-  bool exclusive_;
 };
 
 }  // namespace fathom::cli

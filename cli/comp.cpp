@@ -117,7 +117,7 @@ class CompRun {
         done.kept = !command_.overwrite && isDone(frame, params.madeBy);
       }
       if (done.kept) {
-        Claim::clear(outputFiles(chain_, frame).front());
+        Claim::clear(outputFiles(chain_, frame));
         return done;
       }
       const std::shared_ptr<const Claim> claim = claimOf(frame, params.madeBy, done);
@@ -137,7 +137,7 @@ class CompRun {
   std::shared_ptr<const Claim> claimOf(int frame, const std::string& madeBy, FrameDone& done) const {
     const std::vector<std::string> files = outputFiles(chain_, frame);
     if (madeBy.empty() || files.empty()) return nullptr;
-    std::shared_ptr<const Claim> claim = Claim::take(files.front());
+    std::shared_ptr<const Claim> claim = Claim::take(files);
     done.elsewhere = !claim;
     done.kept = claim && !command_.overwrite && isDone(frame, madeBy);
     return claim;

@@ -74,11 +74,11 @@ ChunkReader::Opening ChunkReader::open() {
   for (const std::string& file : frame.inputs.files()) hash.addFile(file);
   const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
   if (isDone(frame.outputs, madeBy)) {
-    Claim::clear(frame.outputs.image);
+    Claim::clear(frame.outputs.files());
     return Opening::Done;
   }
   if (job_.claims) {
-    claim_ = Claim::take(frame.outputs.image);
+    claim_ = Claim::take(frame.outputs.files());
     if (!claim_) return Opening::Elsewhere;
     if (isDone(frame.outputs, madeBy)) return Opening::Done;
   }
