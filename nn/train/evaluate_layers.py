@@ -31,8 +31,9 @@ from weights import load_model
 FORMS = ("samples", "bins", "pixels")
 EXPONENT, FIRST = 2.0, 1  # of the clustering
 
-# forms: {form: samples.Deep}; several: where a pixel sees two depths; reference, own: light and the variance of that, (3, height, width).
-Subject = namedtuple("Subject", "name forms exposure depth several noisy reference own")
+# forms: {form: samples.Deep}; several: where a pixel sees two depths; counted: where the reference sees no
+# miss, of which samples know nothing, and figures are taken; reference, own: light and the variance of that, (3, height, width).
+Subject = namedtuple("Subject", "name forms exposure depth several counted noisy reference own")
 Layer = namedtuple("Layer", "radiance opacity depth")
 
 
@@ -60,7 +61,7 @@ def subject(pair, forms=FORMS):
     z = layers_crops.stacked(deep, spp)[..., samples.WHERE["depth"].start]
     return Subject(
         pair.name, {form: in_form(deep, form, spp, scale) for form in forms}, samples.exposure_of(deep), samples.mean_depth(deep),
-        layers_crops.several(z), noisy, light, own,
+        layers_crops.several(z), counts, noisy, light, own,
     )  # fmt: skip
 
 
@@ -162,9 +163,11 @@ def main(arguments=None):
             continue
         frame = subject(pair)
         images = figures(model, frame, options.other)
-        everywhere.append((frame.name, {name: relmse(x, frame) for name, x in images.items()}))
-        error = only(frame, frame.several)
-        there.append((f"{frame.name} ({frame.several.mean():.2f})", {name: error(x) for name, x in images.items()}))
+        error = only(frame, frame.counted)
+        everywhere.append((frame.name, {name: error(x) for name, x in images.items()}))
+        several = frame.several & frame.counted
+        error = only(frame, several)
+        there.append((f"{frame.name} ({several.mean():.2f})", {name: error(x) for name, x in images.items()}))
         near, far = fronts(model, frame)
         shares.append((frame.name, {"nearest sample": near, "farthest sample": far}))
         if options.out:
