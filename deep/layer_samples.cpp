@@ -20,6 +20,7 @@ constexpr float kDark = 0.01f;
 constexpr float kLargestDeviation = 8;
 constexpr float kCountUnit = 8;        // doublings
 constexpr float kMostExposed = 1e30f;  // beyond all light; sums of it are finite
+constexpr double kAlone = 1e-6;        // a pixel of one sample, as far as its share tells
 
 enum InputAt : size_t {
   kDiffuseAt = 0,
@@ -75,12 +76,6 @@ void forSamples(const DeepImage& image, const Light& light, std::span<const floa
   }
 }
 
-bool has(std::span<const std::string> channels, const std::string& prefix, const char* letters = "RGB") {
-  return std::ranges::all_of(std::string(letters), [&](char letter) {
-    return std::ranges::find(channels, prefix + letter) != channels.end();
-  });
-}
-
 // The root of the mean of three variances; 0 where one is unknown.
 float deviationAt(const Triple& variance, uint64_t s) {
   float sum = 0;
@@ -103,7 +98,7 @@ class RowMaker {
     addLight(alphas);
     addFeatures(alphas);
     addDepths();
-    addNoise();
+    addNoise(weights, alphas);
     addCounts(weights);
     const size_t count = places_.size();
     nn::logColour(plane(kDiffuseAt), 6 * count, nn::Element::float32, reinterpret_cast<std::byte*>(plane(kDiffuseAt)));
@@ -165,19 +160,53 @@ class RowMaker {
   }
 
   // After the light, before its logarithm.
-  void addNoise() {
-    const std::string specular = inputs_.specularVariance ? "variance.specular." : "variance.";
-    const bool given[] = {inputs_.diffuseVariance, inputs_.specularVariance || inputs_.variance};
+  void addNoise(const std::vector<float>& weights, const std::vector<float>& alphas) {
     for (size_t k = 0; k < 2; ++k) {
-      const Triple variance = given[k] ? tripleOf(image_, k ? specular : "variance.diffuse.") : Triple();
+      const std::vector<float> deviations = deviationsOf(k, weights, alphas);
       const float* light = plane(k ? kSpecularAt : kDiffuseAt);
       const size_t count = places_.size();
-      fill(kNoiseAt + k, [&](uint64_t s, size_t i) {
-        if (!given[k]) return 0.0f;
+      fill(kNoiseAt + k, [&](uint64_t, size_t i) {
         const float mean = light[i] / 3 + light[count + i] / 3 + light[2 * count + i] / 3;
-        return std::min(scale_.exposure * deviationAt(variance, s) / (mean + kDark), kLargestDeviation);
+        return std::min(scale_.exposure * deviations[i] / (mean + kDark), kLargestDeviation);
       });
     }
+  }
+
+  // Of the means of diffuse (k = 0) or specular light.
+  std::vector<float> deviationsOf(size_t k, const std::vector<float>& weights, const std::vector<float>& alphas) const {
+    std::vector<float> result(places_.size(), 0.0f);
+    if (inputs_.cameraSamples()) {
+      for (size_t x = 0; x + 1 < samples_.first.size(); ++x) {
+        const size_t from = samples_.first[x], to = samples_.first[x + 1];
+        std::fill(result.begin() + ptrdiff_t(from), result.begin() + ptrdiff_t(to),
+                  pixelDeviation(k, from, to, weights, alphas));
+      }
+    } else if (k ? inputs_.specularVariance || inputs_.variance : inputs_.diffuseVariance) {
+      const Triple variance = tripleOf(image_, k == 0                     ? "variance.diffuse."
+                                               : inputs_.specularVariance ? "variance.specular."
+                                                                          : "variance.");
+      for (size_t i = 0; i < result.size(); ++i) result[i] = deviationAt(variance, places_[i]);
+    }
+    return result;
+  }
+
+  // The root of the mean variance of what the samples [from, to) of a pixel have on average; 0 for a single one.
+  float pixelDeviation(size_t k, size_t from, size_t to, const std::vector<float>& weights,
+                       const std::vector<float>& alphas) const {
+    const auto at = [&](size_t c, size_t i) {
+      return double((k ? light_.specularAt(c, places_[i]) : light_.diffuseAt(c, places_[i])) / alphas[i]);
+    };
+    double whole = 0, independent = 1, squares = 0;
+    for (size_t i = from; i < to; ++i) whole += double(weights[i]);
+    const auto share = [&](size_t i) { return double(weights[i]) / whole; };
+    for (size_t i = from; i < to; ++i) independent -= share(i) * share(i);  // n equal ones: 1 - 1 / n
+    if (independent <= kAlone) return 0;
+    for (size_t c = 0; c < 3; ++c) {
+      double mean = 0;
+      for (size_t i = from; i < to; ++i) mean += share(i) * at(c, i);
+      for (size_t i = from; i < to; ++i) squares += std::pow(share(i) * (at(c, i) - mean), 2) / 3;
+    }
+    return float(std::min(std::sqrt(squares / independent), double(kMostExposed)));
   }
 
   void addCounts(const std::vector<float>& weights) {
@@ -197,44 +226,6 @@ class RowMaker {
 };
 
 }  // namespace
-
-LayerInputs findLayerInputs(std::span<const std::string> channels, const Attributes& attributes) {
-  const auto given = [&](const char* name) { return std::ranges::find(channels, name) != channels.end(); };
-  return {.components = has(channels, "diffuse.") && has(channels, "specular."),
-          .albedo = has(channels, "albedo."),
-          .normal = has(channels, "N.", "XYZ"),
-          .coc = given("coc"),
-          .lens = given("lens.U") && given("lens.V"),
-          .diffuseVariance = has(channels, "variance.diffuse."),
-          .specularVariance = has(channels, "variance.specular."),
-          .variance = has(channels, "variance."),
-          .counts = given("samples"),
-          .spp = std::max(attributes.getInt("fathom:spp").value_or(0), 0)};
-}
-
-std::vector<std::string> describeMissing(const LayerInputs& inputs) {
-  std::vector<std::string> lines;
-  if (!inputs.components) lines.emplace_back("no diffuse.* and specular.*: all light is taken for one kind");
-  if (!inputs.albedo && !inputs.normal)
-    lines.emplace_back("no albedo.* or N.*: the network has less to go by");
-  else if (!inputs.albedo || !inputs.normal)
-    lines.emplace_back(inputs.albedo ? "no N.*: the network has less to go by"
-                                     : "no albedo.*: the network has less to go by");
-  if (!inputs.counts && inputs.spp <= 0)
-    lines.emplace_back("no samples and no fathom:spp: each deep sample is taken for one camera sample");
-  return lines;
-}
-
-bool layersRead(const LayerInputs& inputs, const std::string& channel) {
-  const auto of = [&](const char* prefix) { return channel.starts_with(prefix); };
-  if (channel == "A" || channel == "Z" || channel == "ZBack") return true;
-  if (channel.size() == 1) return !inputs.components;
-  if (of("variance.diffuse.")) return inputs.diffuseVariance;
-  if (of("variance.specular.")) return inputs.specularVariance;
-  if (of("variance.")) return channel.size() == 10 && inputs.variance && !inputs.specularVariance;
-  return of("diffuse.") || of("specular.") || of("albedo.") || of("N.") || channel == "coc" || of("lens.") ||
-         channel == "samples";
-}
 
 LayerScaleSum::LayerScaleSum(const Box& dataWindow) : dataWindow_(dataWindow), light_(3 * dataWindow.area(), 0.0f) {}
 

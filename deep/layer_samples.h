@@ -8,37 +8,20 @@
 //   12     z / (z + m), m the mean depth of the frame by weight
 //   13     circle of confusion c / (|c| + 4)      14, 15  place on the lens
 //   16     w
-//   17, 18 log(1 + the relative deviation of the means of diffuse and specular light), at most that of 8; 0 where unknown
+//   17, 18 log(1 + the relative deviation of the means of diffuse and specular light), at most that of 8; 0 where unknown. Of a
+//          bin that is of its own means, of a camera sample of its pixel's means, over all samples of that
 //   19     log2(1 + n) / 8, n the camera samples in a bin
 //
 // Camera samples and bins are both taken so. A sample of alpha 0, or with a colour or depth that is not finite, has no say.
 #pragma once
 
-#include <span>
-#include <string>
 #include <vector>
 
 #include "deep/image.h"
+#include "deep/layer_inputs.h"
 #include "nn/layers.h"
 
 namespace fathom::deep {
-
-// What of the channel convention a frame offers to the network.
-struct LayerInputs {
-  bool components = false;  // diffuse.* and specular.*; else R G B
-  bool albedo = false, normal = false, coc = false, lens = false;
-  bool diffuseVariance = false, specularVariance = false, variance = false;
-  bool counts = false;  // samples
-  int spp = 0;          // fathom:spp; 0: unknown
-};
-
-LayerInputs findLayerInputs(std::span<const std::string> channels, const Attributes& attributes);
-
-// One line per thing that is missing and what the network takes instead, for an artist.
-std::vector<std::string> describeMissing(const LayerInputs& inputs);
-
-// Whether the network reads a channel of this name, given what the frame offers.
-bool layersRead(const LayerInputs& inputs, const std::string& channel);
 
 // What the whole frame decides.
 struct LayerScale {

@@ -94,10 +94,14 @@ def result_of(model, frame, form, layers):
     return crop(result.colour[0], frame.exposure), [Layer(*x) for x in zip(light, opacity, crop(result.depth[:, 0]))]
 
 
-def only(frame, where):
-    """(image, frame) -> relMSE over some pixels."""
-    kept = {name: getattr(frame, name)[:, where] for name in ("reference", "own")}
-    return lambda image: relmse(image[:, where], frame._replace(**kept)) if where.any() else float("nan")
+def only(image, frame, where):
+    """Some pixels of both, one behind the other."""
+    return image[:, where], frame._replace(reference=frame.reference[:, where], own=frame.own[:, where])
+
+
+def errors(images, frame, where):
+    """{column: relMSE over some pixels}."""
+    return {name: relmse(*only(x, frame, where)) if where.any() else float("nan") for name, x in images.items()}
 
 
 def figures(model, frame, others):
@@ -163,11 +167,9 @@ def main(arguments=None):
             continue
         frame = subject(pair)
         images = figures(model, frame, options.other)
-        error = only(frame, frame.counted)
-        everywhere.append((frame.name, {name: error(x) for name, x in images.items()}))
+        everywhere.append((frame.name, errors(images, frame, frame.counted)))
         several = frame.several & frame.counted
-        error = only(frame, several)
-        there.append((f"{frame.name} ({several.mean():.2f})", {name: error(x) for name, x in images.items()}))
+        there.append((f"{frame.name} ({several.mean():.2f})", errors(images, frame, several)))
         near, far = fronts(model, frame)
         shares.append((frame.name, {"nearest sample": near, "farthest sample": far}))
         if options.out:

@@ -9,6 +9,7 @@ one and with many, and some whose alphas do not add up to 1. OUT's tensors, S sa
   A, Z, coc, lens.U, ..., diffuse.R, ...  (S): channels as in a deep file, premultiplied
   exposure, depth (1): the scale of the light, and the mean depth
   inputs (S, 20), weight (S), light (S, 3): what the network reads of them; light times the exposure, not premultiplied
+  sample_inputs (S, 20): the same without variance.* and samples, of SPP camera samples per pixel
   partition{L} (S, L); radiance{L} (L, 3, height, width), opacity{L} and depth{L} (L, height, width): of the layers, premultiplied
   colour{L} (3, height, width), alpha{L} (height, width): the result. L is 1, 2 and 4; all light is times the exposure.
 """
@@ -24,6 +25,7 @@ from layers_model import LAYERS, Layered, assembled
 from weights import load_model, save_model, write_tensors
 
 MOST = 9  # samples of a pixel
+SPP = 8
 STRONG = 20  # factor on the last layers of partition and kernels
 
 
@@ -58,6 +60,8 @@ def golden(model, width, height, seed=7):
     frame = assembled([samples.listed(deep, scale, depth)], samples.padded(deep.shape))
     tensors = {"counts": counts, "exposure": [scale], "depth": [depth], **channels}
     tensors.update(inputs=frame.inputs.numpy(), weight=frame.weight.numpy(), light=frame.light.numpy())
+    plain = {name: x for name, x in channels.items() if name != "samples" and not name.startswith("variance.")}
+    tensors["sample_inputs"] = samples.listed(samples.measure(counts, plain, SPP), scale, depth)[0]
     for k in LAYERS:
         with torch.no_grad():
             result = model.result(frame, k)

@@ -6,7 +6,7 @@ import augment
 from augment import PATTERNED, STOPS, TURNED, drawn_pattern
 from clusters import PHYSICAL, chosen, gathered, labels
 from layers_model import assembled
-from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, inputs, light_of
+from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, inputs, light_of, pixel_deviations
 
 # Raw camera samples; bins of them; all of a pixel in one, which is what a network on pixels sees.
 FORMS = {"samples": 0.5, "bins": 0.35, "pixels": 0.15}
@@ -28,6 +28,7 @@ def formed(random, form, samples, spp, scale):
         values = np.zeros((int(counts.sum()), WIDTH), np.float32)
         values[:, :PHYSICAL], values[:, WHERE["count"]] = samples[there], 1
         pixel = np.nonzero(there)[0]
+        values[:, WHERE["noise"]] = pixel_deviations(values[:, :6], values[:, WHERE["count"]][:, 0], pixel)
     else:
         if form == "bins":
             label = labels(samples[:, :, WHERE["depth"].start], counts, scale, random.choice(EXPONENTS), random.choice(FIRSTS))

@@ -7,7 +7,8 @@ The columns of a list, and how many each takes, are in COLUMNS:
   diffuse, specular          light; without components all of it is specular
   albedo, normal             the features
   depth, coc, lens           Z, circle of confusion, place on the lens
-  noise                      root of the mean over the channels of the variance of diffuse and of specular; 0 where unknown
+  noise                      root of the mean over the channels of the variance of diffuse and of specular; 0 where unknown. A bin's is that of
+                             its own means, a camera sample's that of its pixel's, from all of the pixel's samples
   count                      camera samples in the bin
 """
 
@@ -56,6 +57,20 @@ def deviation(channels, prefix):
     return np.sqrt(np.where(known[:, None], variance, 0).clip(min=0).mean(1))
 
 
+def pixel_deviations(light, weight, pixel):
+    """The deviation of each pixel's means over its camera samples, for each of its samples: (S, 2), 0 where there is one sample alone; of
+    light (S, 6), diffuse and specular, and weights."""
+    start = np.flatnonzero(np.diff(pixel, prepend=-1))
+    if not len(start):
+        return np.zeros((0, 2))
+    of = np.repeat(np.arange(len(start)), np.diff(np.append(start, len(pixel))))
+    share = weight.astype(np.float64) / np.add.reduceat(weight.astype(np.float64), start)[of]
+    off = light - np.add.reduceat(share[:, None] * light, start, 0)[of]
+    squares = np.add.reduceat((share[:, None] * off) ** 2, start, 0).reshape(-1, 2, 3).mean(2)
+    independent = 1 - np.add.reduceat(share**2, start)  # of n equal ones 1 - 1 / n
+    return np.sqrt(squares / np.where(independent > 1e-6, independent, np.inf)[:, None])[of]
+
+
 def measure(counts, channels, spp=None):
     """The list of a frame: counts (height, width), of samples, and {name: (S,)}, pixel after pixel, front to back."""
     alpha = channels["A"].astype(np.float64)
@@ -88,6 +103,8 @@ def measure(counts, channels, spp=None):
     needed = np.concatenate([values[:, :6], values[:, WHERE["depth"]]], 1)
     used = (weight > 0) & (np.abs(np.where(np.isfinite(needed), needed, np.inf)) <= LARGEST).all(1)
     pixel = np.repeat(np.arange(counts.size), counts.ravel())[used]
+    if spp and "samples" not in channels and all(x is None for x in noise):  # camera samples
+        values[used, WHERE["noise"]] = pixel_deviations(values[used, :6], weight[used], pixel)
     kept = np.where(np.isfinite(values[used]), values[used], 0).astype(np.float32)
     return Deep(kept, weight[used].astype(np.float32), pixel, counts.shape, frozenset(given))
 

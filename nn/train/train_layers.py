@@ -61,7 +61,8 @@ class Training(train.Training):
     def figures(self, frame):
         for form, layers in LOGGED:
             image, _ = evaluate_layers.result_of(self.average, frame, form, layers)
-            yield {"form": form, "layers": layers, **train.measured(image, frame)}
+            seen, part = evaluate_layers.only(image, frame, frame.counted)
+            yield {"form": form, "layers": layers, **train.measured(seen, part)}
 
 
 def main(arguments=None):

@@ -287,6 +287,21 @@ TEST(LayerSamples, EqualsItsTraining) {
     }
   }
   EXPECT_EQ(next, image.samples());
+  // As camera samples, whose deviation is their pixel's.
+  DeepImage plain = image.copy();
+  std::erase_if(plain.channels, [](const Channel& channel) {
+    return channel.name == "samples" || channel.name.starts_with("variance.");
+  });
+  plain.attributes.set("fathom:spp", 8);
+  const LayerSource camera = layerSource(plain);
+  ASSERT_TRUE(camera.inputs.cameraSamples());
+  next = 0;
+  for (int y = 0; y < image.dataWindow.y1; ++y) {
+    const LayerRow row = layerRow(plain, camera.inputs, scale, y);
+    for (size_t s = 0; s < row.samples.count(); ++s, ++next)
+      for (size_t p = 0; p < nn::kSampleInputs; ++p)
+        ASSERT_NEAR(row.samples.plane(p)[s], values("sample_inputs")[next * nn::kSampleInputs + p], 1e-5) << p;
+  }
   for (const int layers : {1, 2, 4})
     denoiseLayers(net, {.layers = layers}, source, scale, 0, image.dataWindow.y1, [&](const LayeredRows& rows) {
       const flat::Image result = flattenedLayers(rows);

@@ -217,6 +217,23 @@ class Inputs(unittest.TestCase):
         ]  # fmt: skip
         np.testing.assert_allclose(found, expected, rtol=1e-5)
 
+    def test_a_camera_sample_has_the_deviation_of_its_pixels_mean(self):
+        random = np.random.default_rng(4)
+        counts, light = np.array([[0, 4], [1, 3]]), random.random((8, 6))
+        alpha = np.array([1 / (4 - k) for k in range(4)] + [0.25, 0.25, 1 / 3, 0.5])
+        channels = {"A": alpha, "Z": np.full(8, 2.0)}
+        for k, name in enumerate(("diffuse.R", "diffuse.G", "diffuse.B", "specular.R", "specular.G", "specular.B")):
+            channels[name] = light[:, k] * alpha
+        noise = samples.measure(counts, channels, 4).values[:, samples.WHERE["noise"]]
+        for rows in (slice(0, 4), slice(5, 8)):
+            own = light[rows].reshape(-1, 2, 3)
+            expected = np.sqrt(own.var(0, ddof=1).mean(1) / len(own))
+            np.testing.assert_allclose(noise[rows], np.tile(expected, (len(own), 1)), rtol=1e-5)
+        self.assertFalse(noise[4].any())
+        for bins in ({"samples": np.ones(8)}, {f"variance.{c}": np.zeros(8) for c in "RGB"}):
+            self.assertFalse(samples.measure(counts, {**channels, **bins}, 4).values[:, samples.WHERE["noise"]].any())
+        self.assertFalse(samples.measure(counts, channels).values[:, samples.WHERE["noise"]].any())
+
     def test_what_is_missing(self):
         channels = {"A": 1.0, "Z": 2.0, "R": 0.1, "G": 0.2, "B": 0.3, "variance.R": 0.01, "variance.G": 0.01, "variance.B": 0.01}
         deep = samples.measure(np.ones((1, 1), int), {name: np.array([value], np.float32) for name, value in channels.items()}, 7)
