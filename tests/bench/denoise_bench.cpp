@@ -110,7 +110,8 @@ Table costTable(const deep::DeepImage& frame, std::map<std::string, double>& tot
 }
 
 Table sparseTable(const deep::DeepImage& frame) {
-  const deep::DeepImage empty = nineTenthsEmpty(frame), clean = nineTenthsClean(frame);
+  const Box kept = middleOf(frame.dataWindow, 0.1);
+  const deep::DeepImage empty = keepNoisy(frame, kept, Rest::empty), clean = keepNoisy(frame, kept, Rest::converged);
   const std::vector<Case> cases = {
       {"full frame", &frame, {}}, {"nine tenths empty", &empty, {}}, {"nine tenths without noise", &clean, {}}};
   const auto medians = stageMedians(cases);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 namespace fathom::bench {
 namespace {
@@ -35,12 +36,28 @@ deep::DeepImage gathered(const deep::DeepImage& image, const Box& window, const 
   return result;
 }
 
-// A tenth of the window's area, in its middle and of its shape.
-Box middleTenth(const Box& window) {
-  const int width = int(std::lround(window.width() * std::sqrt(0.1)));
-  const int height = int(std::lround(window.height() * std::sqrt(0.1)));
-  const int x0 = window.x0 + (window.width() - width) / 2, y0 = window.y0 + (window.height() - height) / 2;
-  return {x0, y0, x0 + width, y0 + height};
+// What a channel without noise holds: nothing in a variance, half of the mean's count and the mean itself in a half buffer.
+struct Clean {
+  bool changes = false;
+  std::string mean;  // empty: 0
+  float share = 1;
+
+  explicit Clean(const std::string& channel) {
+    const bool half = channel.starts_with("half0.") || channel.starts_with("half1.");
+    changes = half || channel.starts_with("variance.");
+    if (half) mean = channel.substr(6);
+    if (channel.ends_with(".samples")) share = 0.5f;
+  }
+};
+
+// The pixels of a window outside of a box.
+std::vector<size_t> outside(const Box& window, const Box& kept) {
+  std::vector<size_t> result;
+  for (int y = window.y0; y < window.y1; ++y)
+    for (int x = window.x0; x < window.x1; ++x)
+      if (!kept.contains(x, y))
+        result.push_back(size_t(y - window.y0) * size_t(window.width()) + size_t(x - window.x0));
+  return result;
 }
 
 }  // namespace
@@ -53,30 +70,40 @@ deep::DeepImage tiled(const deep::DeepImage& image, int width, int height) {
   });
 }
 
-deep::DeepImage nineTenthsEmpty(const deep::DeepImage& image) {
-  const Box kept = middleTenth(image.dataWindow);
-  const auto width = size_t(image.dataWindow.width());
-  return gathered(image, image.dataWindow, [&](size_t p) {
-    const int x = image.dataWindow.x0 + int(p % width), y = image.dataWindow.y0 + int(p / width);
-    return kept.contains(x, y) ? p : kNothing;
-  });
+Box middleOf(const Box& window, double share) {
+  const int width = int(std::lround(window.width() * std::sqrt(share)));
+  const int height = int(std::lround(window.height() * std::sqrt(share)));
+  const int x0 = window.x0 + (window.width() - width) / 2, y0 = window.y0 + (window.height() - height) / 2;
+  return {x0, y0, x0 + width, y0 + height};
 }
 
-deep::DeepImage nineTenthsClean(const deep::DeepImage& image) {
-  const Box& window = image.dataWindow;
-  const Box kept = middleTenth(window);
+deep::DeepImage keepNoisy(const deep::DeepImage& image, const Box& kept, Rest rest) {
+  const std::vector<size_t> others = outside(image.dataWindow, kept);
+  if (rest == Rest::empty) {
+    std::vector<uint8_t> gone(image.dataWindow.area(), 0);
+    for (const size_t p : others) gone[p] = 1;
+    return gathered(image, image.dataWindow, [&](size_t p) { return gone[p] ? kNothing : p; });
+  }
   deep::DeepImage result = image.copy();
   for (deep::Channel& channel : result.channels) {
-    const bool half = channel.name.starts_with("half0.") || channel.name.starts_with("half1.");
-    if (!half && !channel.name.starts_with("variance.")) continue;
-    const std::span<const float> mean = half ? image.tryGet(channel.name.substr(6)) : std::span<const float>();
-    const float share = channel.name.ends_with(".samples") ? 0.5f : 1;
-    for (size_t p = 0; p < window.area(); ++p) {
-      const int x = window.x0 + int(p % size_t(window.width())), y = window.y0 + int(p / size_t(window.width()));
-      if (kept.contains(x, y)) continue;
+    const Clean clean(channel.name);
+    if (!clean.changes) continue;
+    const std::span<const float> mean = clean.mean.empty() ? std::span<const float>() : image.tryGet(clean.mean);
+    for (const size_t p : others)
       for (size_t s = image.offsets[p]; s < image.offsets[p + 1]; ++s)
-        channel.values[s] = mean.empty() ? 0 : share * mean[s];
-    }
+        channel.values[s] = mean.empty() ? 0 : clean.share * mean[s];
+  }
+  return result;
+}
+
+flat::Image keepNoisy(const flat::Image& image, const Box& kept, Rest rest) {
+  const std::vector<size_t> others = outside(image.dataWindow, kept);
+  flat::Image result = image.copy();
+  for (flat::Plane& plane : result.planes) {
+    const Clean clean(plane.name);
+    if (rest == Rest::converged && !clean.changes) continue;
+    const flat::Plane* mean = rest == Rest::empty || clean.mean.empty() ? nullptr : image.find(clean.mean);
+    for (const size_t p : others) plane.values[p] = mean ? clean.share * mean->values[p] : 0;
   }
   return result;
 }

@@ -1,7 +1,8 @@
-// The frames that benchmarks run on: a small render tiled to a megapixel, and the same with little noise in it.
+// The frames that benchmarks run on: a small render tiled to a megapixel, and the same with noise in a part of it alone.
 #pragma once
 
 #include "deep/image.h"
+#include "flat/image.h"
 
 namespace fathom::bench {
 
@@ -9,11 +10,12 @@ namespace fathom::bench {
 // new.
 deep::DeepImage tiled(const deep::DeepImage& image, int width, int height);
 
-// The image with a rectangle of a tenth of its area in the middle kept, and no sample outside it.
-deep::DeepImage nineTenthsEmpty(const deep::DeepImage& image);
+// A rectangle in the middle of a window, of its shape and such a share of its area.
+Box middleOf(const Box& window, double share);
 
-// The image with a rectangle of a tenth of its area in the middle kept, and no noise outside it: both halves are the
-// mean there, and every variance is 0.
-deep::DeepImage nineTenthsClean(const deep::DeepImage& image);
+// What the pixels outside of a box become: empty, or free of noise, with both halves as the mean and every variance 0.
+enum class Rest { empty, converged };
+deep::DeepImage keepNoisy(const deep::DeepImage& image, const Box& kept, Rest rest);
+flat::Image keepNoisy(const flat::Image& image, const Box& kept, Rest rest);
 
 }  // namespace fathom::bench

@@ -3,16 +3,13 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
-#include <ctime>
 #include <map>
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "flat/neural.h"
 #include "nn/tiles.h"
 #include "tests/bench/measure.h"
 #include "tests/reference/compositional.h"
-#include "tests/reference/noisy_flat.h"
 
 namespace fathom::bench {
 namespace {
@@ -150,69 +147,16 @@ Table costs() {
   return table;
 }
 
-// The right half of a frame without alpha and colour, or with noise that is known to be none, and the upper one.
-flat::Image halfDone(const flat::Image& noisy, bool empty, bool upper) {
-  flat::Image result = noisy.copy();
-  const size_t width = size_t(noisy.dataWindow.width()), height = size_t(noisy.dataWindow.height());
-  for (flat::Plane& plane : result.planes)
-    if (empty || plane.name.starts_with("variance."))
-      for (size_t i = 0; i < plane.values.size(); ++i)
-        if (upper ? i / width < height / 2 : i % width >= width / 2) plane.values[i] = 0;
-  return result;
-}
-
-double cpuSeconds(const std::function<void()>& body) {
-  const std::clock_t start = std::clock();
-  body();
-  return double(std::clock() - start) / CLOCKS_PER_SEC;
-}
-
-// CPU seconds, as others may be at work on the machine; the frames in turn.
-Table skipping() {
-  constexpr int kWidth = 1152, kHeight = 768;
-  Table table(fmt::format("Half of a frame of {}x{} pixels without work, width 16, K = 1", kWidth, kHeight),
-              {"frame", "CPU s/MP", "of the whole", "pixels denoised"});
-  const CompositionalNet net = Setting{16, Precision::float32}.net();
-  flat::Image noisy = reference::makeNoisyFlat(kWidth, kHeight, 1).noisy;
-  noisy.add("A", 1);
-  const std::vector<std::pair<std::string, flat::Image>> frames = [&] {
-    std::vector<std::pair<std::string, flat::Image>> made;
-    made.emplace_back("all noisy", noisy.copy());
-    made.emplace_back("right half empty", halfDone(noisy, true, false));
-    made.emplace_back("right half converged", halfDone(noisy, false, false));
-    made.emplace_back("upper half empty", halfDone(noisy, true, true));
-    made.emplace_back("upper half converged", halfDone(noisy, false, true));
-    made.emplace_back("all converged", noisy.copy());
-    for (flat::Plane& plane : made.back().second.planes)
-      if (plane.name.starts_with("variance.")) std::fill(plane.values.begin(), plane.values.end(), 0.0f);
-    return made;
-  }();
-  std::vector<std::vector<double>> seconds(frames.size());
-  std::vector<double> denoised(frames.size());
-  for (int repeat = 0; repeat < 4; ++repeat)
-    for (size_t i = 0; i < frames.size(); ++i) {
-      flat::NeuralCounts counts;
-      const double time =
-          cpuSeconds([&] { flat::denoiseNeural(net, {.components = 1}, frames[i].second, {}, &counts); });
-      if (repeat > 0) seconds[i].push_back(time);  // the first run makes oneDNN's primitives
-      denoised[i] = double(counts.denoised) / double(counts.denoised + counts.skipped);
-    }
-  for (size_t i = 0; i < frames.size(); ++i)
-    table.add({frames[i].first, median(seconds[i]) / (kWidth * kHeight * 1e-6), median(seconds[i]) / median(seconds[0]),
-               denoised[i]});
-  return table;
-}
-
 }  // namespace
 }  // namespace fathom::bench
 
 int main(int argc, char** argv) {
   using namespace fathom::bench;
   try {
-    const std::map<std::string, Table (*)()> all = {{"costs", costs}, {"rates", rates}, {"skipping", skipping}};
+    const std::map<std::string, Table (*)()> all = {{"costs", costs}, {"rates", rates}};
     const std::string named = argc == 4 ? argv[3] : "";
     if (argc < 3 || argc > 4 || (!named.empty() && !all.contains(named)))
-      fathom::fail("usage: bench_nn FOLDER_OF_FRAMES OUTPUT_FOLDER [rates|costs|skipping]");
+      fathom::fail("usage: bench_nn FOLDER_OF_FRAMES OUTPUT_FOLDER [rates|costs]");
     std::vector<Table> tables;
     for (const auto& [name, make] : all)
       if (named.empty() || name == named) tables.push_back(make());
