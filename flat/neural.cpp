@@ -48,14 +48,23 @@ Buffer<uint8_t> settledPixels(const Image& image) {
   return settled;
 }
 
-bool anyUnsettled(const Buffer<uint8_t>& settled, const Box& window, const nn::Window& block) {
-  const int x1 = std::min(block.x + block.width, window.width()),
-            y1 = std::min(block.y + block.height, window.height());
-  for (int y = block.y; y < y1; ++y) {
+// The smallest window around the pixels of a block that are not settled, at multiples of 4; of no area where there is none.
+nn::Window unsettledPart(const Buffer<uint8_t>& settled, const Box& window, const nn::Window& block) {
+  const int right = std::min(block.x + block.width, window.width()),
+            bottom = std::min(block.y + block.height, window.height());
+  int x0 = right, y0 = bottom, x1 = block.x, y1 = block.y;
+  for (int y = block.y; y < bottom; ++y) {
     const uint8_t* row = settled.data() + size_t(y) * size_t(window.width());
-    if (std::any_of(row + block.x, row + x1, [](uint8_t s) { return s == 0; })) return true;
+    const uint8_t* first = std::find(row + block.x, row + right, uint8_t(0));
+    if (first == row + right) continue;
+    int last = right;
+    while (row[last - 1]) --last;
+    x0 = std::min(x0, int(first - row)), x1 = std::max(x1, last);
+    y0 = std::min(y0, y), y1 = y + 1;
   }
-  return false;
+  if (x0 >= x1) return {};
+  x0 -= x0 % 4, y0 -= y0 % 4, x1 += -x1 & 3, y1 += -y1 & 3;
+  return {x0, y0, x1 - x0, y1 - y0};
 }
 
 float clean(float value) {
@@ -99,7 +108,8 @@ class LightRun {
 
  private:
   nn::BlockWorth worthOf(const nn::CompositionalInput& input, const nn::Window& block, bool open) const {
-    nn::BlockWorth worth{.work = anyUnsettled(settled_, noisy_.dataWindow, block)};
+    nn::BlockWorth worth{.within = unsettledPart(settled_, noisy_.dataWindow, block)};
+    worth.work = worth.within.width > 0;
     if (worth.work && open)
       worth.gain = net_.gains().of(nn::blockStatistics(input.planes.at(block.x, block.y), block.height, block.width));
     return worth;

@@ -60,17 +60,33 @@ void LayersBand::addMeans(int y, const SampleRow& row) {
   });
 }
 
-bool LayersBand::anySamples(const Window& window) const {
-  for (int y = window.y; y < window.y + window.height; ++y) {
-    const uint8_t* row = occupied_.data() + size_t(y - meanRows_.begin) * size_t(width_);
-    if (std::any_of(row + window.x, row + window.x + window.width, [](uint8_t o) { return o != 0; })) return true;
+template <class There>
+Window LayersBand::near(const Window& tile, int reach, const There& there) const {
+  const Window around = grown(tile, reach, height_, width_);
+  int x0 = around.x + around.width, y0 = around.y + around.height, x1 = around.x, y1 = around.y;
+  for (int y = around.y; y < around.y + around.height; ++y) {
+    int first = around.x, last = around.x + around.width;
+    while (first < last && !there(first, y)) ++first;
+    if (first == last) continue;
+    while (!there(last - 1, y)) --last;
+    x0 = std::min(x0, first), x1 = std::max(x1, last);
+    y0 = std::min(y0, y), y1 = y + 1;
   }
-  return false;
+  if (x0 >= x1) return {};
+  constexpr int kStep = LayersNet::kAlignment;
+  x0 = std::max(tile.x, (x0 - reach) / kStep * kStep), y0 = std::max(tile.y, (y0 - reach) / kStep * kStep);
+  x1 = std::min(tile.x + tile.width, (x1 + reach + kStep - 1) / kStep * kStep);
+  y1 = std::min(tile.y + tile.height, (y1 + reach + kStep - 1) / kStep * kStep);
+  return {x0, y0, x1 - x0, y1 - y0};
 }
 
-// `tile`: of the frame.
-void LayersBand::contextTile(const Window& tile) {
-  if (!anySamples(grown(tile, 2 * net_.filterHalo(), height_, width_))) return;
+// `whole`: of the frame.
+void LayersBand::contextTile(const Window& whole) {
+  // Results are made from contexts within filterHalo, and are 0 farther than that from samples.
+  const Window tile = near(whole, 2 * net_.filterHalo(), [&](int x, int y) {
+    return occupied_[size_t(y - meanRows_.begin) * size_t(width_) + size_t(x)] != 0;
+  });
+  if (area(tile) == 0) return;
   const Window from = grown(tile, net_.contextHalo(), height_, width_);
   const size_t values = groups() * pixelFloats() * area(from);
   Buffer<float> mean(values);
@@ -165,12 +181,13 @@ void LayersBand::finishOccupancy(int y) {
 // Layers of one tile.
 class LayersBand::TileFilter {
  public:
-  TileFilter(LayersBand& band, const Window& tile)
-      : band_(band), net_(band.net_), tile_(tile), from_(grown(tile, net_.filterHalo(), band.height_, band.width_)) {}
+  TileFilter(LayersBand& band, const Window& tile) : band_(band), net_(band.net_), whole_(tile) {}
 
   // False where there is nothing in the layer.
   bool run(int layer) {
-    if (!anyWeight(layer)) return false;
+    tile_ = band_.near(whole_, net_.filterHalo(), [&](int x, int y) { return band_.sumRow(layer, 3, y)[x] != 0; });
+    if (area(tile_) == 0) return false;
+    from_ = grown(tile_, net_.filterHalo(), band_.height_, band_.width_);
     shrink(layer);
     for (int i = 0; i < kLayerScales; ++i) filter(i);
     join();
@@ -184,14 +201,6 @@ class LayersBand::TileFilter {
   }
 
  private:
-  bool anyWeight(int layer) const {
-    for (int y = from_.y; y < from_.y + from_.height; ++y) {
-      const float* row = band_.sumRow(layer, 3, y) + from_.x;
-      if (std::any_of(row, row + from_.width, [](float w) { return w != 0; })) return true;
-    }
-    return false;
-  }
-
   Window insideBand() const { return {from_.x, from_.y - band_.sumRows_.begin, from_.width, from_.height}; }
 
   // What is splatted, and embeddings, at all scales.
@@ -246,7 +255,8 @@ class LayersBand::TileFilter {
 
   LayersBand& band_;
   const LayersNet& net_;
-  const Window tile_, from_;
+  const Window whole_;
+  Window tile_, from_;  // what is worked on of it, and what that takes
   WidePlanes values_[kLayerScales], splatted_[kLayerScales], shares_, half_, joined_;
   Buffer<float> embedding_[kLayerScales];
 };

@@ -58,7 +58,9 @@ class LayersBand {
   const float* sumRow(int layer, size_t plane, int y) const {
     return const_cast<LayersBand*>(this)->sumRow(layer, plane, y);
   }
-  bool anySamples(const Window& window) const;
+  // Of a tile, what lies within `reach` of anything that `there` tells of, at multiples of kAlignment.
+  template <class There>
+  Window near(const Window& tile, int reach, const There& there) const;
   void contextTile(const Window& tile);
   void finishOccupancy(int y);
 

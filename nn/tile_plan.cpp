@@ -62,12 +62,17 @@ class Part {
         window_(window),
         across_((window.width + kBlock - 1) / kBlock),
         down_((window.height + kBlock - 1) / kBlock),
-        worth_(size_t(across_) * size_t(down_)) {}
+        worth_(size_t(across_) * size_t(down_)) {
+    for (int i = 0; i < blocks(); ++i) setWorth(i, {});
+  }
 
   int blocks() const { return across_ * down_; }
 
   Window blockAt(int i) const { return pixelsOf({i % across_, i / across_, i % across_ + 1, i / across_ + 1}); }
-  void setWorth(int i, const BlockWorth& worth) { worth_[size_t(i)] = worth; }
+  void setWorth(int i, const BlockWorth& worth) {
+    worth_[size_t(i)] = worth;
+    if (area(worth.within) == 0) worth_[size_t(i)].within = blockAt(i);
+  }
 
   void plan(std::vector<Tile>& tiles) {
     const Blocks all = withWork({0, 0, across_, down_});
@@ -90,6 +95,20 @@ class Part {
     return {window_.x + x0, window_.y + y0, x1 - x0, y1 - y0};
   }
 
+  // The smallest window around all that has work in some blocks.
+  Window windowOf(const Blocks& blocks) const {
+    const Window all = pixelsOf(blocks);
+    int x0 = all.x + all.width, y0 = all.y + all.height, x1 = all.x, y1 = all.y;
+    for (int y = blocks.y0; y < blocks.y1; ++y)
+      for (int x = blocks.x0; x < blocks.x1; ++x) {
+        const auto& [work, within, gain] = worthAt(x, y);
+        if (!work) continue;
+        x0 = std::min(x0, within.x), y0 = std::min(y0, within.y);
+        x1 = std::max(x1, within.x + within.width), y1 = std::max(y1, within.y + within.height);
+      }
+    return {x0, y0, x1 - x0, y1 - y0};
+  }
+
   // The smallest rectangle around those of the blocks that have work.
   Blocks withWork(const Blocks& blocks) const {
     Blocks result{blocks.x1, blocks.y1, blocks.x0, blocks.y0};
@@ -106,9 +125,8 @@ class Part {
     double sum = 0;
     for (int y = blocks.y0; components > 1 && y < blocks.y1; ++y)
       for (int x = blocks.x0; x < blocks.x1; ++x) {
-        const Window block = pixelsOf({x, y, x + 1, y + 1});
         const BlockWorth& worth = worthAt(x, y);
-        if (worth.work) sum += worth.gain[size_t(components / 4)] * block.width * block.height;
+        if (worth.work) sum += worth.gain[size_t(components / 4)] * double(area(worth.within));
       }
     return sum / params_.gainPerPass;
   }
@@ -117,7 +135,7 @@ class Part {
     Way best;
     for (const int components : kComponents) {
       if (components < params_.least || components > params_.most) continue;
-      const double work = net_.flop(pixelsOf(blocks), height_, width_, components) / net_.flopPerPixel(1);
+      const double work = net_.flop(windowOf(blocks), height_, width_, components) / net_.flopPerPixel(1);
       const double cost = kTileCost + work - gainOf(blocks, components);
       if (cost < best.cost) best = {cost, components, {}, {}};
     }
@@ -144,7 +162,7 @@ class Part {
   void collect(const Blocks& blocks, std::vector<Tile>& tiles) {
     const Way& way = wayOf(blocks);
     if (way.components) {
-      tiles.push_back({pixelsOf(blocks), way.components});
+      tiles.push_back({windowOf(blocks), way.components});
       return;
     }
     if (!way.first.empty()) collect(way.first, tiles);

@@ -1,8 +1,8 @@
 // Which parts of a frame the network denoises at once, and with how many components.
 //
 // Source: Fathom's own. What a tile costs is its arithmetic, that for its borders with it; what it gains by more components
-// is what ComponentGains expects of its blocks. Parts of at most 512 pixels a side are cut along straight lines, and shrunk to
-// the blocks with work, as far as that lowers cost less gain (the least over all such cuts is found).
+// is what ComponentGains expects of its blocks. Parts of at most 512 pixels a side are cut along the borders of blocks, and shrunk
+// to what has work, as far as that lowers cost less gain (the least over all such cuts is found).
 #pragma once
 
 #include <array>
@@ -24,6 +24,7 @@ struct Tile {
 // What there is to do in a block.
 struct BlockWorth {
   bool work = true;              // else no tile need have it
+  Window within{};               // of it, all that need be in a tile, at multiples of 4; of no area: the whole block
   std::array<double, 2> gain{};  // see ComponentGains::of
 };
 
@@ -38,7 +39,7 @@ struct TileParams {
 
 inline constexpr int kBlock = 64;  // pixels a side, or what is left of a part
 
-// The tiles of a frame whose sides are multiples of 4. They do not overlap, and have all blocks with work; which components
+// The tiles of a frame whose sides are multiples of 4. They do not overlap, and have all that has work; which components
 // a pixel gets does not depend on the memory. `worth` is called from many threads at once.
 std::vector<Tile> planTiles(const CompositionalNet& net, int height, int width, const TileParams& params,
                             const std::function<BlockWorth(const Window& block)>& worth = {});

@@ -93,6 +93,23 @@ TEST(TilePlan, BlocksWithWorkAreCoveredAndEmptyFramesAreNot) {
   EXPECT_TRUE(planTiles(net(), 600, 900, {}, [](const Window&) { return BlockWorth{.work = false}; }).empty());
 }
 
+// Tiles have no more than what needs them, wherever that ends in a block.
+TEST(TilePlan, TilesEndWhereTheWorkEnds) {
+  const Window part{100, 68, 372, 240};
+  const auto within = [&](const Window& block) {
+    const int x0 = std::max(block.x, part.x), y0 = std::max(block.y, part.y);
+    const int x1 = std::min(block.x + block.width, part.x + part.width),
+              y1 = std::min(block.y + block.height, part.y + part.height);
+    if (x0 >= x1 || y0 >= y1) return BlockWorth{.work = false};
+    return BlockWorth{.within = {x0, y0, x1 - x0, y1 - y0}};
+  };
+  EXPECT_EQ(planTiles(net(), 512, 512, {}, within), std::vector<Tile>({{part, 1}}));
+  const std::vector<int> times = covered(planTiles(net(), 600, 900, {}, within), 600, 900);
+  for (int y = 0; y < 600; ++y)
+    for (int x = 0; x < 900; ++x)
+      ASSERT_EQ(times[size_t(y) * 900 + size_t(x)], x >= 100 && x < 472 && y >= 68 && y < 308) << x << " " << y;
+}
+
 // Components are taken where the gain pays for the work, that of borders too.
 TEST(TilePlan, ComponentsAreTakenForWhatTheyGain) {
   const auto componentsFor = [](double two, double four) {
