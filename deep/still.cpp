@@ -124,17 +124,25 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
     if (inputs.variance) return noiseOfFile(data, file, pixel).quiet(level);
     return data.halves || quietGuides(guides, x, y, level);
   };
+  const std::array<std::span<const float>, 3> rgb = {image.tryGet("R"), image.tryGet("G"), image.tryGet("B")};
+  const auto isBlank = [&](size_t pixel) {
+    if (rgb[0].empty() || rgb[1].empty() || rgb[2].empty()) return false;
+    for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
+      if (data.count[b] > 0 || rgb[0][b] != 0 || rgb[1][b] != 0 || rgb[2][b] != 0) return false;
+    return true;
+  };
   Buffer<uint8_t> calm(pixels);
   parallelFor(0, data.height, [&](int y) {
     for (int x = 0; x < data.width; ++x) {
       const size_t pixel = size_t(y) * width + size_t(x);
-      calm[pixel] = isCalm(pixel, x, y);
+      const bool blank = isBlank(pixel);
+      calm[pixel] = blank || isCalm(pixel, x, y);
       activity.light[pixel] = 0;
       for (size_t c = 0; c < data.components.size(); ++c)
         for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
           const float* v = data.components[c].data.data() + 8 * b;
           // A sample that is not finite says nothing here and asks for the filter all the same.
-          const bool dumb = !(v[3] + v[7] > 0) && data.weight[b] > 0;
+          const bool dumb = !blank && !(v[3] + v[7] > 0) && data.weight[b] > 0;
           if (dumb) calm[pixel] = 0;
           if (dumb || v[0] != 0 || v[1] != 0 || v[2] != 0 || v[4] != 0 || v[5] != 0 || v[6] != 0)
             activity.light[pixel] = uint8_t(activity.light[pixel] | 1u << c);

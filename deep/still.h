@@ -10,7 +10,8 @@ namespace fathom::deep {
 struct Activity {
   // 1: the pixel keeps its colours. It is empty, or the standard deviation of every pixel in the window is below a
   // thousandth of its colour (or of a twentieth of the frame's mean colour, where that is more), which nobody sees. A
-  // pixel of which most is in bins of a single camera sample is unknown, and never still.
+  // pixel of which most is in bins of a single camera sample is unknown, and never still; one without colour that no camera
+  // sample counts for, as flat frames have where there is nothing, is known.
   Buffer<uint8_t> still;
   // Bit c: component c has light in this pixel.
   Buffer<uint8_t> light;

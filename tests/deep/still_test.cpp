@@ -96,6 +96,21 @@ TEST(Still, OneCameraSampleTellsNothing) {
   }
 }
 
+// As flat frames have it: nothing in a pixel that no camera sample counts for.
+TEST(Still, NothingIsKnownToBeNothing) {
+  DeepImage image = renderFrame({.noise = [](int, int) { return 0.0f; }}).noisy;
+  const size_t pixel = 20 * 48 + 20;
+  for (Channel& channel : image.channels)
+    for (size_t p = 0; p < image.pixels() && channel.name != "A" && channel.type != PixelType::Uint; ++p)
+      for (size_t b = image.offsets[p]; b < image.offsets[p + 1] && p % 48 < 40; ++b) channel.values[b] = 0;
+  EXPECT_TRUE(prepare(image.copy(), 4).activity.still[pixel]);
+  for (const float odd : {0.1f, std::numeric_limits<float>::quiet_NaN()}) {
+    DeepImage lit = image.copy();
+    lit.get("R")[image.offsets[pixel]] = odd;
+    EXPECT_FALSE(prepare(std::move(lit), 4).activity.still[pixel]) << odd;
+  }
+}
+
 TEST(Still, TilesAskForComponentsThatHaveLight) {
   DeepImage image = renderFrame({.width = 80, .height = 40}).noisy;
   // Specular light only in the right quarter.
