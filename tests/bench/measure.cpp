@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -16,7 +17,12 @@
 namespace fathom::bench {
 namespace {
 
-double secondsOf(const std::function<void()>& work) {
+double secondsOf(const std::function<void()>& work, Clock clock) {
+  if (clock == Clock::cpu) {
+    const std::clock_t start = std::clock();
+    work();
+    return double(std::clock() - start) / CLOCKS_PER_SEC;
+  }
   const auto start = std::chrono::steady_clock::now();
   work();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -50,11 +56,11 @@ double geometricMean(const std::vector<double>& values) {
   return std::exp(sum / double(values.size()));
 }
 
-std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats) {
+std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats, Clock clock) {
   std::vector<std::vector<double>> seconds(cases.size());
   for (const auto& run : cases) run();
   for (int repeat = 0; repeat < repeats; ++repeat)
-    for (size_t i = 0; i < cases.size(); ++i) seconds[i].push_back(secondsOf(cases[i]));
+    for (size_t i = 0; i < cases.size(); ++i) seconds[i].push_back(secondsOf(cases[i], clock));
   std::vector<double> medians;
   for (const auto& of : seconds) medians.push_back(median(of));
   return medians;

@@ -10,9 +10,13 @@
 
 namespace fathom::bench {
 
+// Seconds as they pass, or those that the process has of the processors, which others do not disturb as much.
+enum class Clock { wall, cpu };
+
 // Runs every case once unmeasured, then all of them in turn `repeats` times, so that a slow moment of the machine
 // falls on all alike; returns the median seconds of each.
-std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats);
+std::vector<double> interleavedMedians(const std::vector<std::function<void()>>& cases, int repeats,
+                                       Clock clock = Clock::wall);
 
 double median(std::vector<double> values);
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <filesystem>
 
 #include "base/error.h"
@@ -99,25 +98,17 @@ double difference(const flat::Image& image, const flat::Image& whole, const Box&
   return std::sqrt(off / all);
 }
 
-double cpuSeconds(const std::function<void()>& body) {
-  const std::clock_t start = std::clock();
-  body();
-  return double(std::clock() - start) / CLOCKS_PER_SEC;
-}
-
 Table measured(const std::string& name, const Method& method, const std::vector<Frame>& frames) {
   Table table(name, {"frame", "CPU s/MP", "skipped", "saved", "saved / skipped", "difference where noisy"});
-  std::vector<std::vector<double>> seconds(frames.size());
-  std::vector<flat::Image> results;
-  for (const Frame& frame : frames) results.push_back(method(frame));  // and primitives are made, memory is touched
-  for (int repeat = 0; repeat < kRepeats; ++repeat)
-    for (size_t i = 0; i < frames.size(); ++i) seconds[i].push_back(cpuSeconds([&] { method(frames[i]); }));
-  const double whole = median(seconds[0]);
+  std::vector<flat::Image> results(frames.size());
+  std::vector<std::function<void()>> cases;
+  for (size_t i = 0; i < frames.size(); ++i) cases.emplace_back([&, i] { results[i] = method(frames[i]); });
+  const std::vector<double> seconds = interleavedMedians(cases, kRepeats, Clock::cpu);
   for (size_t i = 0; i < frames.size(); ++i) {
     const Frame& frame = frames[i];
-    const double saved = 1 - median(seconds[i]) / whole;
+    const double saved = 1 - seconds[i] / seconds[0];
     const bool inside = frame.kept.width() > 2 * kReach && frame.kept.height() > 2 * kReach;
-    table.add({frame.name, median(seconds[i]) / (kWidth * kHeight * 1e-6), frame.skipped, saved,
+    table.add({frame.name, seconds[i] / (kWidth * kHeight * 1e-6), frame.skipped, saved,
                frame.skipped > 0 ? Cell(saved / frame.skipped) : Cell("-"),
                inside ? Cell(difference(results[i], results[0], frame.kept)) : Cell("-")});
   }

@@ -2,31 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "tests/reference/bilateral.h"
 #include "tests/reference/simd_targets.h"
 
 namespace fathom::flat {
 namespace {
 
-std::vector<Padded> randomPlanes(int count, int width, int height, int pad, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> value(0.1f, 1);
-  std::vector<Padded> planes;
-  for (int i = 0; i < count; ++i) {
-    Padded& plane = planes.emplace_back(width, height, pad);
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x) plane.row(y)[x] = value(random);
-    plane.extend();
-  }
-  return planes;
-}
+using reference::randomPadded;
 
 void expectLikeTwin(int width, int height, int guides, int count, const BilateralParams& params,
                     bool variances = false) {
-  const auto guide = randomPlanes(guides, width, height, params.radius, 1);
-  const auto in = randomPlanes(count, width, height, params.radius, 2);
+  const auto guide = randomPadded(guides, width, height, params.radius, 1);
+  const auto in = randomPadded(count, width, height, params.radius, 2);
   std::vector<Padded> out;
   for (int i = 0; i < count; ++i) out.emplace_back(width, height, 0);
   const auto run = variances ? bilateralVariance : bilateral;
@@ -61,7 +48,7 @@ TEST(Bilateral, VariancesEqualTheirTwin) {
 }
 
 TEST(Bilateral, KeepsAConstantAndStopsAtAnEdgeOfTheGuide) {
-  std::vector<Padded> guide = randomPlanes(1, 40, 8, 5, 1), in = randomPlanes(1, 40, 8, 5, 2), out;
+  std::vector<Padded> guide = randomPadded(1, 40, 8, 5, 1), in = randomPadded(1, 40, 8, 5, 2), out;
   out.emplace_back(40, 8, 0);
   for (int y = 0; y < 8; ++y)
     for (int x = 0; x < 40; ++x) {

@@ -13,30 +13,13 @@
 namespace fathom::flat {
 namespace {
 
-std::vector<reference::MixNeighbour> randomNeighbours(size_t count, float noise, std::mt19937& random) {
-  std::normal_distribution<float> normal;
-  std::vector<reference::MixNeighbour> result;
-  for (size_t i = 0; i < count; ++i) {
-    MixSample sample = {};
-    sample.samples = float(random() % 33);
-    for (size_t c = 0; c < 3; ++c) {
-      sample.mean[c] = 0.5f + 0.2f * normal(random);
-      sample.difference[c] = 0.1f * normal(random);
-      sample.residual[c] = 0.3f * sample.difference[c] + 0.1f * normal(random);
-      sample.variance[c] = noise * std::fabs(normal(random));
-    }
-    result.push_back({sample, 1.0f / float(1 + random() % 5)});
-  }
-  return result;
-}
-
 TEST(MixKernel, EqualsItsTwin) {
   forSimdTargets([] {
     std::mt19937 random(3);
     for (size_t count = 0; count <= 49; ++count)
       for (const float noise : {0.0f, 1e-4f, 0.1f})
         for (const float prior : {0.0f, 0.4f, 1.0f}) {
-          const auto all = randomNeighbours(count, noise, random);
+          const auto all = reference::randomNeighbours(count, noise, random);
           MixNeighbours neighbours;
           for (const auto& [sample, reach] : all) neighbours.add(sample, reach);
           MixSample here = {};

@@ -6,37 +6,20 @@
 #include "nn/blocked.h"
 #include "nn/colour_kernel.h"
 #include "nn/kernel_filter.h"
+#include "tests/reference/kernel_planes.h"
 #include "tests/reference/layers.h"
 #include "tests/reference/simd_targets.h"
 
 namespace fathom::nn {
 namespace {
 
+using reference::bordered;
+using reference::grouped;
 using reference::randomVolume;
 using reference::Volume;
 
 constexpr std::pair<int, int> kSizes[] = {{1, 1},  {1, 2},  {2, 1},  {3, 5},  {4, 7},  {2, 8}, {5, 15},
                                           {3, 16}, {2, 17}, {3, 31}, {2, 32}, {1, 33}, {7, 50}};
-
-// Channels in groups, the last filled up with `rest`; exactly as many floats as there are, so that reading more is found.
-Buffer<float> grouped(const Volume& volume, int block, int groups, float rest) {
-  const int pixels = volume.height * volume.width;
-  Buffer<float> result(size_t(groups * block * pixels), rest);
-  for (int c = 0; c < volume.channels; ++c)
-    for (int i = 0; i < pixels; ++i)
-      result[size_t((c / block * pixels + i) * block + c % block)] = float(volume.values[size_t(c * pixels + i)]);
-  return result;
-}
-
-BorderedColour bordered(const Volume& colour) {
-  BorderedColour result;
-  result.resize(colour.height, colour.width);
-  for (int c = 0; c < 3; ++c)
-    for (int y = 0; y < colour.height; ++y)
-      for (int x = 0; x < colour.width; ++x) result.row(c, y)[x] = float(colour.at(c, y, x));
-  result.extend();
-  return result;
-}
 
 TEST(NnKernels, FilterEqualsItsTwin) {
   forSimdTargets([] {

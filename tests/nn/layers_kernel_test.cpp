@@ -8,58 +8,21 @@
 
 #include "nn/kernel_filter.h"
 #include "nn/layers_graphs.h"
+#include "tests/reference/kernel_planes.h"
 #include "tests/reference/layers.h"
 #include "tests/reference/simd_targets.h"
 
 namespace fathom::nn {
 namespace {
 
+using reference::grouped;
 using reference::randomVolume;
+using reference::splatted;
 using reference::Volume;
+using reference::wide;
 
 constexpr std::pair<int, int> kSizes[] = {{1, 1},  {1, 2},  {2, 1},  {3, 5},  {4, 7},  {6, 8}, {5, 15},
                                           {3, 16}, {2, 17}, {3, 31}, {2, 32}, {1, 33}, {7, 50}};
-
-// Channels in groups, the last filled up with `rest`.
-Buffer<float> grouped(const Volume& volume, int block, int groups, float rest) {
-  const int pixels = volume.height * volume.width;
-  Buffer<float> result(size_t(groups * block * pixels), rest);
-  for (int c = 0; c < volume.channels; ++c)
-    for (int i = 0; i < pixels; ++i)
-      result[size_t((c / block * pixels + i) * block + c % block)] = float(volume.values[size_t(c * pixels + i)]);
-  return result;
-}
-
-WidePlanes wide(const Volume& volume) {
-  WidePlanes result;
-  result.resize(size_t(volume.channels), volume.height, volume.width);
-  for (int c = 0; c < volume.channels; ++c)
-    for (int y = 0; y < volume.height; ++y)
-      for (int x = 0; x < volume.width; ++x) result.row(size_t(c), y)[x] = float(volume.at(c, y, x));
-  result.clearBorders();
-  return result;
-}
-
-// Sums by source pixels, where the kernel gathers by result pixels.
-Volume splatted(const Volume& logits, const Volume& values) {
-  Volume sum(6, values.height, values.width), out(5, values.height, values.width);
-  for (int y = 0; y < values.height; ++y)
-    for (int x = 0; x < values.width; ++x)
-      for (int k = 0; k < 25; ++k) {
-        const int ty = y + k / 5 - 2, tx = x + k % 5 - 2;
-        if (ty < 0 || tx < 0 || ty >= values.height || tx >= values.width) continue;
-        const double weight = std::exp(std::clamp(logits.at(k, y, x), -12.0, 12.0));
-        for (int c = 0; c < 6; ++c) sum.at(c, ty, tx) += weight * values.at(c, y, x);
-      }
-  for (int i = 0; i < values.height * values.width; ++i) {
-    const int y = i / values.width, x = i % values.width;
-    const double n = sum.at(4, y, x) + 1e-12;
-    for (int c = 0; c < 3; ++c) out.at(c, y, x) = sum.at(c, y, x) / n;
-    out.at(3, y, x) = std::min(1.0, sum.at(3, y, x) / n);
-    out.at(4, y, x) = sum.at(5, y, x) / n;
-  }
-  return out;
-}
 
 void expectNear(const WidePlanes& planes, const Volume& expected, double bound) {
   for (int c = 0; c < expected.channels; ++c)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,19 @@ inline std::vector<double> bilateral(int x, int y, const flat::BilateralParams& 
     }
   for (double& s : sum) s /= squared ? weight * weight : weight;
   return sum;
+}
+
+inline std::vector<flat::Padded> randomPadded(int count, int width, int height, int pad, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> value(0.1f, 1);
+  std::vector<flat::Padded> planes;
+  for (int i = 0; i < count; ++i) {
+    flat::Padded& plane = planes.emplace_back(width, height, pad);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) plane.row(y)[x] = value(random);
+    plane.extend();
+  }
+  return planes;
 }
 
 }  // namespace fathom::reference

@@ -150,6 +150,38 @@ def tuft(rng, count=None):
     return merged(blades)
 
 
+def rooted(rng, mesh, count):
+    """`count` random points of a surface, and its normals there."""
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    face = rng.choice(len(areas), count, p=areas / areas.sum())
+    a, b = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    points = np.einsum('nk,nkc->nc', np.concatenate([1 - a, a * (1 - b), a * b], 1), corners[face])
+    return points, normals[face] / areas[face, None]
+
+
+def pelt(rng, mesh):
+    """Short fur to long hair on a closed surface of about one unit: thin ribbons, combed in places, finer than pixels mostly."""
+    count, joints = int(np.exp(rng.uniform(np.log(4e3), np.log(3e4)))), 5
+    roots, out = rooted(rng, mesh, count)
+    out *= np.sign(np.sum(out * (roots - mesh.vertices.mean(0)), 1, keepdims=True) + 1e-9)
+    combed = np.stack([waves(rng)(2 * roots) for _ in range(3)], 1) * rng.uniform(0.2, 1.2)
+    length = np.exp(rng.uniform(np.log(0.04), np.log(0.5))) * rng.uniform(0.6, 1, (count, 1))
+    bend = combed + rng.uniform(0.05, 0.5) * rng.normal(size=(count, 3)) + [0, 0, -rng.uniform(0, 0.6)]
+    t = np.linspace(0, 1, joints)[:, None, None]
+    middle = roots + length * (out * t + bend * t * t)  # (joints, count, 3)
+    across = np.cross(out + 0.3 * rng.normal(size=(count, 3)), bend + 0.3 * rng.normal(size=(count, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True) + 1e-9
+    half = 0.5 * np.exp(rng.uniform(np.log(0.001), np.log(0.008))) * (1 - 0.8 * t) * across
+    vertices = np.stack([middle - half, middle + half], 2).transpose(1, 0, 2, 3).reshape(-1, 3)
+    first = (2 * joints * np.arange(count)[:, None] + 2 * np.arange(joints - 1)).reshape(-1, 1)
+    faces = np.concatenate([first + [0, 1, 2], first + [2, 1, 3]])
+    shade = np.repeat(rng.random(count), 2 * joints)
+    uv = np.stack([shade, np.tile(np.repeat(np.linspace(0, 1, joints), 2), count)], 1)
+    return Mesh(vertices, faces, uv, smooth=False)
+
+
 def fence(rng):
     """Upright bars with rails, a lattice, or slats."""
     n, thin = int(rng.integers(5, 24)), rng.uniform(0.004, 0.03)

@@ -193,7 +193,31 @@ def veil(rng, hdris):
     return stage
 
 
-KINDS = {f.__name__: f for f in (outdoors, studio, room, clutter, veil)}
+def pelt(rng, hdris):
+    """A few furry things, with a few others between them."""
+    spread = rng.uniform(1.0, 2.5)
+    stage = Stage(radius=0.8 * spread)
+    scatter(rng, stage, int(rng.integers(2, 10)), spread)
+    stage.targets = []
+    bodies = (lambda r: meshes.sphere(), meshes.superquadric, meshes.blob, meshes.lathe, meshes.torus)
+    for _ in range(int(rng.integers(1, 5))):
+        body = bodies[rng.integers(len(bodies))](rng)
+        skin = materials.two_sided(materials.matte(rng, textured=0.3))
+        hair = materials.two_sided(materials.matte(rng, textured=0.5) if rng.random() < 0.6 else materials.plastic(rng, textured=0.5))
+        place = dict(scale=rng.uniform(0.7, 2), rotation=meshes.rotation(rng), to=(*rng.uniform(-0.6, 0.6, 2) * spread, rng.uniform(0.3, 1.2)))
+        stage.put(body.moved(0.98).moved(**place), skin)
+        stage.put(meshes.pelt(rng, body).moved(**place), hair)
+        stage.targets.append(np.array(place['to']))
+    ground(rng, stage, 3 * spread)
+    if rng.random() < 0.5:
+        stage.add(lights.environment(rng, hdris))
+    else:
+        lamps(rng, stage, int(rng.integers(1, 4)), 1.5 * spread, 2, 6)
+        stage.add(lights.fill(rng))
+    return stage
+
+
+KINDS = {f.__name__: f for f in (outdoors, studio, room, clutter, veil, pelt)}
 
 
 def build(rng, hdris, kind=''):

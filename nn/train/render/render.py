@@ -68,7 +68,7 @@ def main():
     p.add_argument('--hdri', required=True, help='folder of *.hdr environments')
     p.add_argument('--scenes', default='', help='folder of NAME/scene.xml; none: random scenes alone')
     p.add_argument('--jobs', type=span, default=(0, 200), help='indices FIRST:END; three views each')
-    p.add_argument('--kind', default='', help='random scenes of one kind alone: outdoors, studio, room, clutter or veil')
+    p.add_argument('--kind', default='', help='random scenes of one kind alone: outdoors, studio, room, clutter, veil or pelt')
     p.add_argument('--only-samples', action='store_true', help='add files of samples to views that have a reference, and render nothing else')
     p.add_argument('--threads', type=int, default=os.cpu_count())
     p.add_argument('--batch', type=int, default=8, help='jobs per process')
