@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "flat/finite.h"
+#include "nn/colour_kernel.h"
 
 namespace fathom::flat {
 
@@ -35,6 +36,10 @@ enum PlaneAt : size_t {
   kGivenAt = 19,
   kKindAt = 23
 };
+
+// Planes of logarithms that a light has of its own.
+constexpr std::array<size_t, 8> kLogarithms = {kColourAt, kColourAt + 1, kColourAt + 2, kNoiseAt,
+                                               kHalvesAt, kRestAt,       kRestAt + 1,   kRestAt + 2};
 
 int rounded(int side) {
   constexpr int kStep = nn::CompositionalNet::kAlignment;
@@ -207,19 +212,21 @@ void NeuralPlanes::select(Light light) {
       for (size_t c = 0; c < 3; ++c) {
         const float value = own.at(c, i), exposed = std::clamp(s * value, 0.0f, kMostExposed);
         colourRow(c, y)[x] = exposed;
-        row(kColourAt + c, y)[x] = std::log1p(exposed);
+        row(kColourAt + c, y)[x] = exposed;
         const float rest = light == Light::Whole ? 0.0f : std::max(rgb.at(c, i) - value, 0.0f);
-        row(kRestAt + c, y)[x] = std::log1p(std::min(s * rest, kMostExposed));
+        row(kRestAt + c, y)[x] = std::min(s * rest, kMostExposed);
         mean += exposed / 3;
         if (halves) apart += std::abs(first.at(c, i) - second.at(c, i)) / 3;
       }
       const auto relative = [&](float deviation) {
-        return std::log1p(std::min(deviation * s / (mean + kDark), kLargestDeviation));
+        return std::min(deviation * s / (mean + kDark), kLargestDeviation);
       };
       if (!halves && variances.given()) apart = kHalvesPerDeviation * variances.meanDeviation(i);
       row(kNoiseAt, y)[x] = variances.given() ? relative(variances.deviation(i)) : 0.0f;
       row(kHalvesAt, y)[x] = relative(apart);
     }
+    for (const size_t plane : kLogarithms)
+      nn::logColour(row(plane, y), size_t(width), nn::Element::float32, reinterpret_cast<std::byte*>(row(plane, y)));
   });
   const size_t pixels = size_t(height_) * size_t(width_);
   fillRest(colour_.data(), 3);
