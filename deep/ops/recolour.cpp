@@ -43,9 +43,9 @@ struct Row {
 
 // Alphas whose optical depths are scaled so that they flatten to `target`.
 void scaleAlphas(double target, std::span<float> alphas) {
-  double depth = 0, passed = 1;
-  for (const float alpha : alphas) depth += opticalDepth(double(alpha)), passed *= 1 - double(alpha);
-  if (float(1 - passed) == float(target)) return;
+  double depth = 0, whole = 0;
+  for (const float alpha : alphas) depth += opticalDepth(double(alpha)), whole += -std::log1p(-double(alpha));
+  if (float(-std::expm1(-whole)) == float(target)) return;
   const double wanted = opticalDepth(target);
   for (float& alpha : alphas) {
     const double own = depth > 0 ? opticalDepth(double(alpha)) / depth : 1 / double(alphas.size());
