@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "deep/ops/named_channels.h"
 #include "deep/volume.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -62,10 +63,6 @@ struct Samples {
   size_t count;
   Block alpha, weight;
 };
-
-float limited(float value) {
-  return std::min(std::max(value, -kLargest), kLargest);
-}
 
 // (value / alpha) ^ power * alpha. In double where a step of it is beyond what floats hold: light of hardly any alpha.
 float raised(float value, float alpha, float power) {

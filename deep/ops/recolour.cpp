@@ -10,6 +10,7 @@
 #include "deep/ops/named_channels.h"
 #include "deep/tidy.h"
 #include "deep/volume.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -92,9 +93,7 @@ void colour(std::span<const uint64_t> offsets, const Row& row, std::span<const f
 
 void scale(const Row& row, float* values) {
   for (size_t i = 0; i < row.factor.size(); ++i)
-    if (row.factor[i] != 1)
-      values[i] =
-          float(std::clamp(row.factor[i] * double(finiteOrZero(values[i])), -double(kLargest), double(kLargest)));
+    if (row.factor[i] != 1) values[i] = limited(row.factor[i] * double(finiteOrZero(values[i])));
 }
 
 }  // namespace
