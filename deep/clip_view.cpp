@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/pixel_view.h"
-#include "flat/finite.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -22,7 +22,7 @@ template <class WeightOf>
 float sum(const PixelParts& parts, const float* values, const WeightOf& weightOf) {
   double total = 0;
   for (size_t i = 0; i < parts.count; ++i) total += weightOf(i) * double(finiteOrZero(values[parts.sample[i]]));
-  return float(total);
+  return limited(total);
 }
 
 // A plane of the result and what it is made of.
@@ -111,7 +111,7 @@ void write(const Plan& plan, PixelView& view, size_t pixel, size_t to) {
     PixelView::Totals totals;
     plan.alpha[to] = float(view.compositeTidy(plan.values, totals));
     for (size_t c = 0; c < kTogether; ++c)
-      if (plan.colours[c]) plan.colours[c][to] = float(totals[c]);
+      if (plan.colours[c]) plan.colours[c][to] = limited(totals[c]);
     return;
   }
   view.composite();

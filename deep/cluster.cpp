@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/cluster_plan.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -122,9 +123,9 @@ void mean(const Row& row, size_t set, const float* in, float* out) {
   for (size_t b = 0; b < sums.size(); ++b) {
     const double weight = totals.weight[set][b], heard = totals.count[set][b];
     if (weight > 0)
-      out[b] = float(sums[b] / weight * double(row.plan.alpha[b]));
+      out[b] = limited(sums[b] / weight * double(row.plan.alpha[b]));
     else
-      out[b] = totals.weight[kAll][b] == 0 && heard > 0 ? float(sums[b] * totals.count[kAll][b] / heard) : 0.0f;
+      out[b] = totals.weight[kAll][b] == 0 && heard > 0 ? limited(sums[b] * totals.count[kAll][b] / heard) : 0.0f;
   }
 }
 
@@ -156,7 +157,7 @@ void varianceOfMean(const Row& row, const Value& value, float* out) {
   for (size_t b = 0; b < means.size(); ++b) {
     const double part =
         weights[b] > 0 ? row.totals.squares[b] / (weights[b] * weights[b]) : 1;  // 1 / n for equal weights
-    out[b] = part < 1 - 1e-12 ? float(scatter[b] / weights[b] * part / (1 - part)) : 0.0f;
+    out[b] = part < 1 - 1e-12 ? limited(scatter[b] / weights[b] * part / (1 - part)) : 0.0f;
   }
 }
 

@@ -17,7 +17,7 @@ namespace fathom::deep {
 // Where the samples of a pixel all have the same effective alpha, 1/n, each is one of n camera samples (n: attribute
 // fathom:spp, or told from the alphas): means are plain, and effective alphas of the bins are counts/n. Other samples
 // count by effective alpha within their bin, and the bin's A is that of its samples composited. Colour without alpha is
-// kept. A layout with alphas gives A. Bins without samples have A 0 (or the layout's) and no colour. A sample with a
+// kept. Results end at 1e15: a variance of light without alpha, not premultiplied, may be beyond. A layout with alphas gives A. Bins without samples have A 0 (or the layout's) and no colour. A sample with a
 // non-finite value has no say in any mean or half, but keeps its part in A and `samples`. Samples of a pixel where the
 // layout has no bin are lost. Z is the layout's depth. Where a bin holds volumes, Z to ZBack is their extent, up to
 // halfway to the next bin. Samples may lie in any order. Throws Error when A or Z is missing, or when the samples are

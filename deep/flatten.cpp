@@ -11,6 +11,7 @@
 #include "deep/channels.h"
 #include "deep/flat_attributes.h"
 #include "deep/row_weights.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -104,7 +105,7 @@ void composite(const Row& row, const std::array<Sum, kTogether>& sums) {
     std::array<double, kTogether> total = {};
     for (size_t i = row.offsets[x]; i < row.offsets[x + 1]; ++i)
       for (size_t c = 0; c < kTogether; ++c) total[c] += weights[i - begin] * double(finiteOrZero(sums[c].values[i]));
-    for (size_t c = 0; c < kTogether; ++c) sums[c].out[row.first + x] = float(total[c]);
+    for (size_t c = 0; c < kTogether; ++c) sums[c].out[row.first + x] = limited(total[c]);
   }
 }
 

@@ -21,7 +21,7 @@ struct FlattenParams {
 // lie in any order and overlap: they are sorted, split and merged as `tidy` does; but points at the same depth are
 // composited one after the other in an image of camera samples or of bins made of them (attribute fathom:spp, or
 // channels of statistics), whose alphas count samples. NaN alphas count as 0, others are brought into [0,1]; non-finite
-// values (above 1e15 included) count as 0. Z becomes, as the parameters say:
+// values (above 1e15 included) count as 0, and sums end at 1e15. Z becomes, as the parameters say:
 // - Mean: the mean over the pixel's samples weighted by effective alpha, a volume standing for its middle;
 // - Front: where the first sample with alpha begins;
 // - Back: where the last sample that is seen ends (an opaque volume: where it begins, for nothing behind that is seen);

@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "deep/channels.h"
 #include "deep/sample_depths.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -45,7 +46,7 @@ float valueOf(const Piece& piece, Role role, std::span<const float> values) {
   double sum = 0;
   for (const Share& share : piece.shares)
     sum += (role == Role::Plain ? share.part : share.weight) * double(finiteOrZero(values[share.sample]));
-  return float(sum);
+  return limited(sum);
 }
 
 // Writes one piece into sample `to` of `out`; `first` is the pixel's first sample in `image`.

@@ -30,8 +30,10 @@ struct TidyResult {
 };
 
 // Sorts, splits volumes that others overlap, and merges what then coincides: flattening gives the same. Samples that
-// need neither are passed on bit for bit, and a tidy image whole. In the others, non-finite values count as 0; a merged
+// need neither are passed on bit for bit, and a tidy image whole. In the others, non-finite values count as 0 and sums end
+// at 1e15, above which they would be no numbers; a merged
 // sample takes the id of the one with the larger share, and the share-weighted mean of what is not premultiplied.
+// Volumes whose alpha together rounds to 1 are opaque from their front on: that shows once something is put into them.
 // Ranges that cannot be used (reversed, infinite, no number) become points, a Z that is no number becomes infinity.
 // Throws Error when A or Z is missing, and when the volumes of one pixel overlap so much that their pieces would be
 // more than 100 million.

@@ -15,7 +15,7 @@ namespace fathom::deep {
 struct FogHeight {
   double height = 0, falloff = 1;
   Axis up = Axis::Y;
-  int slabs = 16;  // volumes per pixel that stand for it, of the same alpha each
+  int slabs = 16;  // volumes per pixel that stand for it, of the same alpha each; more where it is thick
 };
 
 struct FogParams {
@@ -27,7 +27,8 @@ struct FogParams {
 };
 
 // The fog in front of every pixel of the data window as an image of volumes: channels R, G, B, A, Z, ZBack. One volume
-// where the density does not change along the ray. Lengths are measured along the rays; where nothing tells the field
+// where the density does not change along the ray, if its optical depth is at most 4: thicker fog is cut there, and at each
+// 4 more up to 20, since a FLOAT alpha cannot tell it. Lengths are measured along the rays; where nothing tells the field
 // of view (see ViewRays), along the view axis. At the borders of the volumes the transmittance is exact, and within
 // them it is off by less than 1 - exp(-optical depth / slabs), most often by far less.
 //

@@ -9,6 +9,10 @@ namespace fathom::deep {
 
 namespace {
 
+// The optical depth of a volume that its FLOAT alpha still tells well, inside of it, too: with 17 it would be opaque, and
+// hide all from its front on. And that behind which nothing is seen.
+constexpr double kThickest = 4, kBlind = 20;
+
 // The mean of exp(-x) from 0 to `depth`.
 double meanPassing(double depth) {
   return depth == 0 ? 1 : -std::expm1(-depth) / depth;
@@ -50,6 +54,10 @@ double FogSlabs::Stretch::lengthWithin(double depth) const {
   return std::min(length, to - from);
 }
 
+double FogSlabs::Stretch::depthBefore(double z) const {
+  return rate >= 0 ? depthWithin(z - from) : depth() - depthWithin(to - z);
+}
+
 double FogSlabs::Stretch::where(double depth) const {
   return rate >= 0 ? from + lengthWithin(depth) : to - lengthWithin(std::max(0.0, this->depth() - depth));
 }
@@ -86,18 +94,22 @@ void FogSlabs::set(int x, int y) {
     even &= stretch.rate == 0 && stretch.densest == stretches_[0].densest;
   }
   if (!(all > 0)) return;
+  wanted_.clear();
   const int slabs = even ? 1 : params_.height->slabs;
+  for (int i = 1; i < slabs; ++i) wanted_.push_back(all * i / slabs);
+  for (double depth = kThickest; depth < std::min(all, kBlind + kThickest); depth += kThickest)
+    wanted_.push_back(depth);
+  std::sort(wanted_.begin(), wanted_.end());
   borders_.push_back(float(params_.near));
   depths_.push_back(0);
   double before = 0;  // of the stretches that are passed
   size_t k = 0;
-  for (int i = 1; i < slabs; ++i) {
-    const double depth = all * i / slabs;
+  for (const double depth : wanted_) {
     while (k + 1 < stretches_.size() && depth > before + stretches_[k].depth()) before += stretches_[k++].depth();
     const float z = float(stretches_[k].where(depth - before));
     if (!(z > borders_.back() && z < float(params_.far))) continue;
     borders_.push_back(z);
-    depths_.push_back(depth);
+    depths_.push_back(std::clamp(before + stretches_[k].depthBefore(double(z)), depths_.back(), all));
   }
   borders_.push_back(float(params_.far));
   depths_.push_back(all);

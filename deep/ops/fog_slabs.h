@@ -34,7 +34,8 @@ class FogSlabs {
     double depthWithin(double length) const;  // of `length` from its densest end
     double lengthWithin(double depth) const;  // the other way round
     double depth() const { return depthWithin(to - from); }
-    double where(double depth) const;  // the place with so much of it in front
+    double where(double depth) const;    // the place with so much of it in front
+    double depthBefore(double z) const;  // the other way round
   };
   void findStretches(const ViewRay& ray);
   double depthTo(double z) const;
@@ -42,6 +43,7 @@ class FogSlabs {
   const FogParams& params_;
   ViewRays rays_;
   std::vector<Stretch> stretches_;
+  std::vector<double> wanted_;  // optical depths in front of the borders that there shall be
   std::vector<float> borders_;
   std::vector<double> depths_;
 };

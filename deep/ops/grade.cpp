@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "deep/ops/named_channels.h"
 #include "deep/volume.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -63,15 +64,22 @@ struct Samples {
   Block alpha, weight;
 };
 
+// (value / alpha) ^ power * alpha. In double where a step of it is beyond what floats hold: light of hardly any alpha.
+float raised(float value, float alpha, float power) {
+  const float quotient = value / alpha, result = std::pow(quotient, power);
+  if (std::isnormal(quotient) && std::isnormal(result)) return std::min(result * alpha, kLargest);
+  return float(std::min(std::pow(double(value) / double(alpha), double(power)) * double(alpha), double(kLargest)));
+}
+
 void gradeTriple(const GradeParams& params, const Samples& samples, const Triple& values, std::array<Block, 3>& out) {
   for (size_t c = 0; c < 3; ++c) {
     const float* in = values[c];
     if (!in) continue;
     const float gain = params.gain[c], offset = params.offset[c], power = 1 / params.gamma[c];
-    for (size_t i = 0; i < samples.count; ++i) out[c][i] = finiteOrZero(in[i]) * gain + samples.alpha[i] * offset;
+    for (size_t i = 0; i < samples.count; ++i)
+      out[c][i] = limited(finiteOrZero(in[i]) * gain + samples.alpha[i] * offset);
     for (size_t i = 0; power != 1 && i < samples.count; ++i)
-      if (samples.alpha[i] > 0 && out[c][i] > 0)
-        out[c][i] = std::min(std::pow(out[c][i] / samples.alpha[i], power) * samples.alpha[i], kLargest);
+      if (samples.alpha[i] > 0 && out[c][i] > 0) out[c][i] = raised(out[c][i], samples.alpha[i], power);
   }
   if (params.saturation == 1) return;
   for (size_t i = 0; i < samples.count; ++i) {
@@ -83,14 +91,16 @@ void gradeTriple(const GradeParams& params, const Samples& samples, const Triple
 void store(const Samples& samples, const Block& graded, float* values) {
   for (size_t i = 0; i < samples.count; ++i) {
     const float weight = samples.weight[i], before = values[i];
-    const float after = std::min(std::max(graded[i], -kLargest), kLargest);
-    values[i] = weight == 0 ? before : (1 - weight) * finiteOrZero(before) + weight * after;
+    values[i] = weight == 0 ? before : (1 - weight) * finiteOrZero(before) + weight * limited(graded[i]);
   }
 }
 
 void check(const GradeParams& params) {
   for (const float gamma : params.gamma)
     if (!(gamma > 0)) fail("gamma: expected numbers above 0, found {}", gamma);
+  for (size_t c = 0; c < 3; ++c)
+    for (const float number : {params.gain[c], params.offset[c], params.saturation})
+      if (!std::isfinite(number)) fail("grade: expected finite numbers, found {}", number);
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ struct GradeParams {
 // at 1e15. Alphas count as opacity() has them and stay, and so does every channel that is not named: where R G B alone
 // is graded, it is no longer the sum of components. Variances and half buffers of what is graded are left out: see
 // statisticsOf. Halo 0. Throws Error when A or Z is missing, when a name is no channel or not one of R, G and B, when
-// gamma is not > 0, and when saturation is asked for where R, G or B is missing.
+// gamma is not > 0 or another number not finite, and when saturation is asked for where R, G or B is missing.
 DeepImage grade(DeepImage image, const GradeParams& params);
 
 }  // namespace fathom::deep

@@ -10,6 +10,7 @@
 #include "deep/ops/named_channels.h"
 #include "deep/tidy.h"
 #include "deep/volume.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -43,9 +44,9 @@ struct Row {
 
 // Alphas whose optical depths are scaled so that they flatten to `target`.
 void scaleAlphas(double target, std::span<float> alphas) {
-  double depth = 0, passed = 1;
-  for (const float alpha : alphas) depth += opticalDepth(double(alpha)), passed *= 1 - double(alpha);
-  if (float(1 - passed) == float(target)) return;
+  double depth = 0, whole = 0;
+  for (const float alpha : alphas) depth += opticalDepth(double(alpha)), whole += -std::log1p(-double(alpha));
+  if (float(-std::expm1(-whole)) == float(target)) return;
   const double wanted = opticalDepth(target);
   for (float& alpha : alphas) {
     const double own = depth > 0 ? opticalDepth(double(alpha)) / depth : 1 / double(alphas.size());
@@ -92,9 +93,7 @@ void colour(std::span<const uint64_t> offsets, const Row& row, std::span<const f
 
 void scale(const Row& row, float* values) {
   for (size_t i = 0; i < row.factor.size(); ++i)
-    if (row.factor[i] != 1)
-      values[i] =
-          float(std::clamp(row.factor[i] * double(finiteOrZero(values[i])), -double(kLargest), double(kLargest)));
+    if (row.factor[i] != 1) values[i] = limited(row.factor[i] * double(finiteOrZero(values[i])));
 }
 
 }  // namespace

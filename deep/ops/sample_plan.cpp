@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "deep/channels.h"
-#include "flat/finite.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -18,7 +18,7 @@ const RowPlan::Share& largest(std::span<const RowPlan::Share> shares) {
 float mixed(std::span<const RowPlan::Share> shares, float RowPlan::Share::*factor, const Buffer<float>& values) {
   double sum = 0;
   for (const RowPlan::Share& share : shares) sum += double(share.*factor) * double(finiteOrZero(values[share.sample]));
-  return float(sum);
+  return limited(sum);
 }
 
 // Fills a row of a channel: what is kept from its source, and valueOf(i) for the i-th one made.

@@ -82,7 +82,7 @@ class RowPlan {
 
 // The image that `rows` describe: one plan per row of `window`, each of window.width() pixels. Display window,
 // attributes and channels are the source's. Where a plan's sample is a volume, the source must have ZBack. Non-finite
-// premultiplied values count as 0 where they are not passed on whole.
+// premultiplied values count as 0 where they are not passed on whole, and sums end at 1e15.
 DeepImage applyPlan(const DeepImage& source, const Box& window, std::span<const RowPlan> rows);
 
 // Plans the rows of an image in parallel, with plan(y, row) for each row of its data window, y absolute, and applies

@@ -102,6 +102,27 @@ std::vector<FogParams> someFogs() {
           {.near = 1, .far = 5, .density = 0}};
 }
 
+// A volume whose alpha rounds to 1 would be opaque from its front on.
+TEST(Fog, ThickFogIsNoWallWhereItBegins) {
+  DeepImage image = randomSamples({.window = {0, 0, 9, 7}});
+  image.displayWindow = {0, 0, 9, 7};
+  giveCamera(image);
+  for (const double density : {1.0, 40.0, 1000.0}) {
+    const FogParams params{.near = 1, .far = 9, .density = density, .height = FogHeight{.height = 2.8, .falloff = 0.5}};
+    const DeepImage fog = fogVolumes(image, params);
+    for (size_t p = 0; p < fog.pixels(); ++p) {
+      double depth = 0;
+      for (size_t s = fog.offsets[p]; s < fog.offsets[p + 1]; ++s) {
+        const double z = fog.get("Z")[s];
+        const double before = z > 1 ? numericDepth(image, params, int(p % 9), int(p / 9), z) : 0;
+        EXPECT_NEAR(std::exp(-before), std::exp(-depth), 1e-4);
+        depth -= std::log1p(-double(fog.get("A")[s]));
+        EXPECT_TRUE(fog.get("A")[s] < 0.9818f || depth > 23.9);  // the alpha of an optical depth of 4
+      }
+    }
+  }
+}
+
 TEST(Fog, InsertedIsWhatTheEquationOfTransferShows) {
   for (unsigned seed = 1; seed <= 12; ++seed)
     for (const FogParams& params : someFogs()) {
