@@ -22,8 +22,8 @@ namespace fathom::deep {
 namespace {
 
 using stress::Draw;
-using stress::ExtremeParams;
 using stress::extremeDeep;
+using stress::ExtremeParams;
 using stress::record;
 
 // All that the filter of a frame reads, made as `denoise` makes it.
@@ -273,7 +273,8 @@ TEST(StressDenoiseKernels, TheMixEqualsItsTwin) {
           sample.mean[c] = float(f);
           sample.difference[c] = float(f * draw.normal() * double(draw.of({0, 1e-3f, 0.3f, 1})));
           sample.residual[c] = float(f * draw.normal() * double(draw.of({0, 1e-3f, 0.3f, 10})));
-          sample.variance[c] = float(draw.below(4) ? f * f * draw.power(1e-6, 10) : double(draw.of({0, 1e-40f, 1e19f})));
+          sample.variance[c] =
+              float(draw.below(4) ? f * f * draw.power(1e-6, 10) : double(draw.of({0, 1e-40f, 1e19f})));
         }
         all.push_back({sample, float(draw.uniform(0.01, 1))});
       }

@@ -103,7 +103,8 @@ TEST(StressDenoise, AnyFrameGivesFiniteColoursAndKeepsTheRest) {
               DeepImage before = image.copy(), after = run(image, method);
               expectFinite(after);
               for (const Channel& channel : image.channels)
-                if (isLight(channel.name) || !after.find(channel.name)) before.erase(channel.name), after.erase(channel.name);
+                if (isLight(channel.name) || !after.find(channel.name))
+                  before.erase(channel.name), after.erase(channel.name);
               ASSERT_EQ(reference::difference(before, after), "");
             }
 }
@@ -115,8 +116,8 @@ TEST(StressDenoise, ValuesStayBetweenThoseOfTheFrame) {
   for (int round = 0; round < 2 * stress::rounds(); ++round)
     for (const Method& method : kMethods) {
       if (method.params.gate && method.params.filter == FilterKind::Own) continue;
-      const DeepImage image =
-          extremeDeep({.seed = unsigned(round), .mostBins = 2, .largest = 6e4f, .components = false, .features = false});
+      const DeepImage image = extremeDeep(
+          {.seed = unsigned(round), .mostBins = 2, .largest = 6e4f, .components = false, .features = false});
       const DenoisePlan plan = planOf(image, method);
       const DeepImage out = run(image, plan);
       const auto alpha = image.get("A");
@@ -189,7 +190,8 @@ TEST(StressDenoise, FollowsTheWindow) {
 }
 
 // The pixels of a frame in another order: those of `from(x, y)`, bins in the order they had.
-DeepImage moved(const DeepImage& image, int width, int height, const std::function<std::pair<int, int>(int, int)>& from) {
+DeepImage moved(const DeepImage& image, int width, int height,
+                const std::function<std::pair<int, int>(int, int)>& from) {
   DeepImage result = image.copyLayout();
   const Box& box = image.dataWindow;
   result.dataWindow = {box.x0, box.y0, box.x0 + width, box.y0 + height};
@@ -248,11 +250,13 @@ TEST(StressDenoise, APartIsDenoisedAsTheWhole) {
       const DeepImage whole = run(image, plan);
       const int from = std::max(0, first - halo);
       const auto cut = [&](const DeepImage& of, int begin, int stop) {
-        return moved(of, lying ? stop - begin : 5, lying ? 5 : stop - begin,
-                     [&](int x, int y) { return lying ? std::pair{x + begin, y} : std::pair{x, y + begin}; });
+        return moved(of, lying ? stop - begin : 5, lying ? 5 : stop - begin, [&](int x, int y) {
+          return lying ? std::pair{x + begin, y} : std::pair{x, y + begin};
+        });
       };
       const DeepImage part = run(cut(image, from, end), plan);
-      const double far = farthest(cut(whole, first, first + size), cut(part, first - from, first - from + size), plan.level);
+      const double far =
+          farthest(cut(whole, first, first + size), cut(part, first - from, first - from + size), plan.level);
       EXPECT_LT(far, 1e-6) << method.name << (lying ? " lying" : " standing") << ", halo " << halo;
       record("deep denoiser", "parts with the filter's reach", far, 1e-6);
     }
@@ -260,12 +264,14 @@ TEST(StressDenoise, APartIsDenoisedAsTheWhole) {
 
 // Random poison in random channels of up to three bins.
 TEST(StressDenoise, PoisonStaysWithinReach) {
-  constexpr float kPoisons[] = {stress::kNan, stress::kInfinity, -stress::kInfinity, -1, -1e10f, 1e20f, 9e14f, -9e14f, 1e-42f};
+  constexpr float kPoisons[] = {stress::kNan, stress::kInfinity, -stress::kInfinity, -1, -1e10f, 1e20f, 9e14f, -9e14f,
+                                1e-42f};
   const int length = 160;
   for (const Method& method : kMethods)
     for (const bool lying : {true, false}) {
       const DeepImage clean =
-          renderFrame({.width = lying ? length : 4, .height = lying ? 4 : length, .volumes = true, .emission = true}).noisy;
+          renderFrame({.width = lying ? length : 4, .height = lying ? 4 : length, .volumes = true, .emission = true})
+              .noisy;
       const DenoisePlan plan = planOf(clean, method);
       const int halo = denoiseHalo(plan);
       const DeepImage expected = run(clean, plan);
@@ -309,7 +315,10 @@ TEST(StressDenoise, HalvesOfAnyCountsKeepTheLight) {
   constexpr double kBound = 1e-5;
   double worst = 0;
   for (const Method& method : kMethods)
-    for (const auto& [n, n0] : {std::pair{2, 0}, {2, 1}, {2, 2}, {10000, 1}, {10000, 9999}, {10000, 0}, {10000, 5000}}) {
+    for (const auto& [n, n0] :
+         {std::pair{2, 0}, {2, 1}, {2, 2}, {10000, 1}, {10000, 9999}, {10000, 0}, {10000, 5000}}) {
+      // Flattened halves are of half of a pixel's samples each: more or fewer are noise of the pixel's.
+      if (method.guided && 2 * n0 != n) continue;
       DeepImage image = renderFrame({.width = 20, .height = 14, .empty = [](int, int) { return false; }}).noisy;
       const auto all = image.get("samples"), first = image.get("half0.samples"), second = image.get("half1.samples");
       for (size_t i = 0; i < all.size(); ++i) all[i] = float(n), first[i] = float(n0), second[i] = float(n - n0);
