@@ -310,6 +310,24 @@ TEST(StressDenoise, PoisonStaysWithinReach) {
     }
 }
 
+// All that a bin can claim at once.
+TEST(StressDenoise, HugeCountsAndVariancesTogetherStayFinite) {
+  for (const Method& method : kMethods)
+    for (const float light : {0.5f, 9e14f}) {
+      DeepImage image = renderFrame({.width = 20, .height = 16}).noisy;
+      const DenoisePlan plan = planOf(image, method);
+      for (const size_t pixel : {150U, 151U, 210U}) {
+        const size_t bin = size_t(image.offsets[pixel]);
+        for (Channel& channel : image.channels) {
+          if (channel.name.starts_with("variance.") || channel.name.ends_with("samples")) channel.values[bin] = 9e14f;
+          if (stress::factorOf(channel.name, 2) == 2) channel.values[bin] = light;
+        }
+      }
+      SCOPED_TRACE(method.name);
+      expectFinite(run(image, plan));
+    }
+}
+
 // Halves of 0, 1 and very different counts, and pixels of 10,000 samples: nothing is lost and nothing made up.
 TEST(StressDenoise, HalvesOfAnyCountsKeepTheLight) {
   constexpr double kBound = 1e-5;
