@@ -155,7 +155,7 @@ float meanLevel(const DeepImage& image) {
   for (const char* name : kRgb) {
     const flat::Plane& plane = flattened.get(name);
     for (size_t i = 0; i < plane.values.size(); ++i)
-      if (alpha.values[i] > 0) level.add(plane.values[i]);
+      if (alpha.values[i] > 0) level.add(double(plane.values[i]));
   }
   return level.result();
 }

@@ -48,7 +48,7 @@ Prior priorOf(const ErrorEstimate& estimate, const Noise& noise, float mostRatio
   };
   LevelSum sizes;
   for (size_t c = 0; c < 3; ++c)
-    for (size_t i = 0; i < estimate.error[c].size(); ++i) sizes.add(sizeOf(c, i));
+    for (size_t i = 0; i < estimate.error[c].size(); ++i) sizes.add(double(sizeOf(c, i)));
   const double limit = std::min(sizes.limit(kAbsurd), double(kLargest));
   double sure = 0, spread = 0, variance = 0;
   for (size_t c = 0; c < 3; ++c)

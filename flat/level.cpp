@@ -32,7 +32,7 @@ size_t LevelSum::endOf(double farAbove) const {
   const double most = farAbove * rest.magnitude / double(rest.count);
   size_t end = others;
   while (end < kMost && std::ldexp(0.5, int(end) - kBias) <= most) ++end;
-  return end;
+  return below(end).count < below(kMost).count ? end : kMost;
 }
 
 double LevelSum::limit(double farAbove) const {

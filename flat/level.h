@@ -6,6 +6,7 @@
 // of two; negative values by their magnitude.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -20,11 +21,11 @@ inline constexpr double kAbsurd = 1e6;
 class LevelSum {
  public:
   // What is not finite does not count.
-  void add(float value) {
-    if (!isFinite(value)) return;
+  void add(double value) {
+    if (!(std::fabs(value) <= double(kLargest))) return;
     Binade& binade = binades_[binadeOf(value)];
-    binade.sum += double(value);
-    binade.magnitude += std::fabs(double(value));
+    binade.sum += value;
+    binade.magnitude += std::fabs(value);
     ++binade.count;
   }
 
@@ -45,10 +46,11 @@ class LevelSum {
     uint64_t count = 0;
   };
 
-  static size_t binadeOf(float value) {
+  // What is nothing as a float is nothing here.
+  static size_t binadeOf(double value) {
     int exponent = 0;
     if (value != 0) std::frexp(value, &exponent);
-    return value == 0 ? 0 : size_t(exponent + kBias);
+    return value == 0 ? 0 : size_t(std::max(exponent + kBias, 0));
   }
   Binade below(size_t end) const;
   size_t endOf(double farAbove) const;

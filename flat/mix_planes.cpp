@@ -45,7 +45,7 @@ float exposed(float value, float scale) {
 double meanDepth(const Plane* plane) {
   LevelSum depths;
   for (size_t i = 0; plane && i < plane->values.size(); ++i)
-    if (plane->values[i] > 0) depths.add(plane->values[i]);
+    if (plane->values[i] > 0) depths.add(double(plane->values[i]));
   const double mean = depths.mean(kAbsurd);
   return mean > 0 ? mean : 1;
 }
@@ -67,7 +67,7 @@ class Source {
       y_.push_back(find(candidate.denoised, ""));
       LevelSum errors;
       for (size_t i = 0; i < candidate.k.size(); ++i)
-        errors.add(relative(candidate.map.error, i, levelOf(y_.back(), i)));
+        errors.add(double(relative(candidate.map.error, i, levelOf(y_.back(), i))));
       frame_.push_back(logarithm(float(errors.mean(kAbsurd))));
     }
   }

@@ -107,7 +107,7 @@ Variances variancesOf(const Image& image, Light light) {
 float meanDepth(const Plane& plane) {
   LevelSum depths;
   for (const float value : plane.values)
-    if (value > 0) depths.add(value);
+    if (value > 0) depths.add(double(value));
   const auto mean = float(depths.mean(kAbsurd));
   return mean > 0 ? mean : 1.0f;
 }
@@ -142,7 +142,7 @@ float exposureOf(const Image& image) {
   std::erase_if(means, [](double mean) { return !(mean > 0); });
   if (means.empty()) return 1;
   LevelSum all;
-  for (const double mean : means) all.add(float(mean));
+  for (const double mean : means) all.add(mean);
   const double least = kTinyBlock * all.mean(kAbsurd);
   double logarithms = 0;
   for (const double mean : means) logarithms += std::log(std::max(mean, least));

@@ -52,7 +52,7 @@ void fromHalves(const Image& image, Noise& noise) {
 float levelOf(const std::array<const Plane*, 3>& colour) {
   LevelSum level;
   for (const Plane* plane : colour)
-    for (const float v : plane->values) level.add(v);
+    for (const float v : plane->values) level.add(double(v));
   return level.result();
 }
 

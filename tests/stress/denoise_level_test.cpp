@@ -54,7 +54,7 @@ TEST(StressLevel, OfFlatFramesToo) {
 
 float levelOf(const std::vector<float>& values) {
   flat::LevelSum sum;
-  for (const float v : values) sum.add(v);
+  for (const float v : values) sum.add(double(v));
   return sum.result();
 }
 

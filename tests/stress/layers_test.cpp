@@ -67,7 +67,8 @@ DeepImage cameraSamples(int width, int height, unsigned most, unsigned seed, flo
   image.offsets = Buffer<uint64_t>(image.pixels() + 1, uint64_t(0));
   for (size_t p = 0; p < image.pixels(); ++p)
     image.offsets[p + 1] = image.offsets[p] + (p == image.pixels() / 2 ? most : draw.below(4) ? 1 + draw.below(8) : 0);
-  for (const char* name : {"A", "Z", "diffuse.R", "diffuse.G", "diffuse.B", "specular.R", "specular.G", "specular.B", "R", "G", "B"})
+  for (const char* name :
+       {"A", "Z", "diffuse.R", "diffuse.G", "diffuse.B", "specular.R", "specular.G", "specular.B", "R", "G", "B"})
     image.add(name, PixelType::Float);
   for (size_t p = 0; p < image.pixels(); ++p) {
     float z = float(draw.power(1e-6, 1e6));
@@ -77,7 +78,8 @@ DeepImage cameraSamples(int width, int height, unsigned most, unsigned seed, flo
       image.get("Z")[s] = z = std::nextafter(draw.below(3) ? z : z * 1.5f, 1e30f);
       for (const char* c : {"R", "G", "B"}) {
         const float light = float(draw.below(5) ? draw.uniform(0.1, 2) : draw.power(1e-44, double(largest)));
-        for (const char* group : {"diffuse.", "specular.", ""}) image.get(std::string(group) + c)[s] = light * image.get("A")[s];
+        for (const char* group : {"diffuse.", "specular.", ""})
+          image.get(std::string(group) + c)[s] = light * image.get("A")[s];
       }
     }
   }
@@ -138,8 +140,8 @@ void expectLikeTwin(const DeepImage& image, int layers) {
     }
     worst = std::max(worst, std::fabs(double(flattened.planes[3].values[i]) - expected.flat.at(3, y, x)));
   }
-  record("layered network, L = " + std::to_string(layers), "values, alphas, depths, up to 10,000 samples: against the twin",
-         worst, kBound);
+  record("layered network, L = " + std::to_string(layers),
+         "values, alphas, depths, up to 10,000 samples: against the twin", worst, kBound);
   EXPECT_LT(worst, kBound) << width << ", " << layers << " layers";
 }
 
@@ -161,10 +163,12 @@ TEST(StressLayers, AnyFrameGivesFiniteColours) {
         for (const double empty : {0.1, 0.95, 1.0})
           for (const int layers : {1, 2, 4}) {
             SCOPED_TRACE(testing::Message() << width << "x" << height << " to " << largest << ", empty " << empty);
-            expectFinite(run(
-                extremeDeep(
-                    {.width = width, .height = height, .seed = unsigned(round + 5), .empty = empty, .largest = largest}),
-                trainedNet(), layers));
+            expectFinite(run(extremeDeep({.width = width,
+                                          .height = height,
+                                          .seed = unsigned(round + 5),
+                                          .empty = empty,
+                                          .largest = largest}),
+                             trainedNet(), layers));
           }
   expectFinite(run(cameraSamples(9, 7, 10000, 3, 9e14f), trainedNet(), 4));
 }
@@ -188,9 +192,9 @@ TEST(StressLayers, FollowsTheExposure) {
                                         most);
         for (const char* name : {"R", "G", "B"})
           for (size_t i = 0; i < image.samples(); ++i)
-            worst = std::max(worst, std::fabs(double(found.bins.get(name)[i]) / double(scale) -
-                                              double(expected.bins.get(name)[i])) /
-                                        most);
+            worst = std::max(
+                worst,
+                std::fabs(double(found.bins.get(name)[i]) / double(scale) - double(expected.bins.get(name)[i])) / most);
       }
   }
   record("layered network", "exposure over 12 powers of ten", worst, kBound);
@@ -205,13 +209,14 @@ TEST(StressLayers, PoisonStaysWithinReach) {
   const LayerScale scale = measureLayers(layerSource(clean), {});
   const auto flatOf = [&](const DeepImage& image) {
     flat::Image result;
-    denoiseLayers(net, {}, layerSource(image), scale, image.dataWindow.y0, image.dataWindow.y1, [&](const LayeredRows& rows) {
-      result = flattenedLayers(rows);
-      for (const char* name : {"R", "G", "B"}) {
-        const DeepImage bins = inLayerColours(image.copy(), rows, layerSource(image).inputs);
-        for (const float v : bins.get(name)) ASSERT_TRUE(std::isfinite(v));
-      }
-    });
+    denoiseLayers(net, {}, layerSource(image), scale, image.dataWindow.y0, image.dataWindow.y1,
+                  [&](const LayeredRows& rows) {
+                    result = flattenedLayers(rows);
+                    for (const char* name : {"R", "G", "B"}) {
+                      const DeepImage bins = inLayerColours(image.copy(), rows, layerSource(image).inputs);
+                      for (const float v : bins.get(name)) ASSERT_TRUE(std::isfinite(v));
+                    }
+                  });
     return result;
   };
   const flat::Image expected = flatOf(clean);

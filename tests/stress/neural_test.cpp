@@ -25,7 +25,8 @@ const nn::CompositionalNet& net(const std::string& name) {
   static std::map<std::string, nn::CompositionalNet> nets;
   auto found = nets.find(name);
   if (found == nets.end())
-    found = nets.emplace(name, nn::CompositionalNet(nn::readWeights(FATHOM_DEMO "/../models/" + name + ".safetensors"))).first;
+    found = nets.emplace(name, nn::CompositionalNet(nn::readWeights(FATHOM_DEMO "/../models/" + name + ".safetensors")))
+                .first;
   return found->second;
 }
 
@@ -54,9 +55,9 @@ void expectLikeTwin(const std::string& model, int width, int height, int compone
   planes.select(Light::Whole);
   const nn::CompositionalInput input = planes.input();
   const PlainWeights weights = plain(model);
-  const Volume expected = reference::CompositionalTwin(weights).denoise(
-      volumeOf(input.planes, nn::kInputPlanes, input.height, input.width),
-      volumeOf(input.colour, 3, input.height, input.width), components);
+  const Volume expected =
+      reference::CompositionalTwin(weights).denoise(volumeOf(input.planes, nn::kInputPlanes, input.height, input.width),
+                                                    volumeOf(input.colour, 3, input.height, input.width), components);
   std::vector<float> found(expected.values.size());
   nn::CompositionalNet::Workspace workspace;
   net(model).denoise(input, {0, 0, input.width, input.height}, components,
@@ -67,8 +68,8 @@ void expectLikeTwin(const std::string& model, int width, int height, int compone
       for (int x = 0; x < input.width; ++x) most = std::max(most, double(input.colour.row(size_t(c), y)[x]));
   for (size_t i = 0; i < found.size(); ++i)
     worst = std::max(worst, std::fabs(double(found[i]) - expected.values[i]) / (most + 1e-30));
-  record("network " + model + ", K = " + std::to_string(components), "values, variance 0 and huge: against the twin", worst,
-         kBound);
+  record("network " + model + ", K = " + std::to_string(components), "values, variance 0 and huge: against the twin",
+         worst, kBound);
   EXPECT_LT(worst, kBound) << model << " " << width << "x" << height << " to " << largest;
 }
 
@@ -140,8 +141,9 @@ TEST(StressNeural, FollowsTheExposure) {
       const Image found = denoiseNeural(net(model), {.components = components}, stress::scaled(noisy, scale));
       for (const Plane& plane : expected.planes)
         for (size_t i = 0; i < plane.values.size(); ++i)
-          worst = std::max(worst, std::fabs(double(found.get(plane.name).values[i]) / double(scale) - double(plane.values[i])) /
-                                      most(expected));
+          worst = std::max(
+              worst, std::fabs(double(found.get(plane.name).values[i]) / double(scale) - double(plane.values[i])) /
+                         most(expected));
     }
     EXPECT_LT(worst, kBound) << model << " " << components;
     record("network " + model + ", K = " + std::to_string(components), "exposure over 12 powers of ten", worst, kBound);
@@ -159,7 +161,8 @@ TEST(StressNeural, PoisonStaysWithinReach) {
   const nn::CompositionalNet& small = net("small");
   const NeuralParams params{.components = 1};
   Image clean = render(kLength, 32, 1);
-  for (const char* name : {"albedo.R", "albedo.G", "albedo.B", "N.X", "N.Y", "N.Z", "variance.Z"}) clean.add(name, 0.4f);
+  for (const char* name : {"albedo.R", "albedo.G", "albedo.B", "N.X", "N.Y", "N.Z", "variance.Z"})
+    clean.add(name, 0.4f);
   const Image expected = denoiseNeural(small, params, clean);
   Image shifted = clean.copy();
   shifted.dataWindow = {17, -3, 17 + kLength, 29};
@@ -172,8 +175,8 @@ TEST(StressNeural, PoisonStaysWithinReach) {
   for (int round = 0; round < 20 * stress::rounds(); ++round) {
     Image image = clean.copy();
     const size_t x = draw.below(kLength), i = x + kLength * draw.below(32);
-    Plane& plane = draw.below(2) ? *image.find(kRgbNames[draw.below(3)])
-                                 : image.planes[draw.below(unsigned(image.planes.size()))];
+    Plane& plane =
+        draw.below(2) ? *image.find(kRgbNames[draw.below(3)]) : image.planes[draw.below(unsigned(image.planes.size()))];
     plane.values[i] = draw.of({stress::kNan, stress::kInfinity, -stress::kInfinity, -1, 1e20f, 9e14f, 1e-42f});
     SCOPED_TRACE(plane.name + " " + std::to_string(plane.values[i]) + " at " + std::to_string(x));
     const bool light = plane.name.size() == 1 && plane.name != "A";  // or depth, of which the mean counts

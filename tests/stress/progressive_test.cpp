@@ -142,7 +142,7 @@ TEST(StressProgressive, TheErrorMapEqualsItsTwin) {
       return std::fabs(e.error[c][i]) + e.spread[c][i] + scene.noise.variance[c][i];
     };
     for (size_t c = 0; c < 3; ++c)
-      for (size_t i = 0; i < scene.pixels(); ++i) all.add(sizeOf(c, i));
+      for (size_t i = 0; i < scene.pixels(); ++i) all.add(double(sizeOf(c, i)));
     const double limit = std::min(all.limit(kAbsurd), 1e15);
     double sure = 0, spread = 0, variance = 0;
     std::vector<Padded> guide;
