@@ -64,7 +64,7 @@ void moveBins(const DenoiseData& data, const Pixel& pixel, size_t c, float targe
   }
   const float alphaNoise = std::max(0.0f, square - mean * mean) / std::max(pixel.samples, 1.0f);
   const float pull = (target - now) / (error + params.alphaNoise * alphaNoise);
-  if (!(error > 0) || !isFinite(pull)) return;
+  if (!(error > 0) || !std::isfinite(error) || !isFinite(pull)) return;  // squares may be too many to tell
   for (size_t b = pixel.begin; b < pixel.end; ++b) {
     if (!(data.weight[b] > 0)) continue;
     float& value = colours[3 * b + c];

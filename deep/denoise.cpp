@@ -13,6 +13,7 @@
 #include "deep/gate.h"
 #include "deep/noise_response.h"
 #include "deep/still.h"
+#include "flat/level.h"
 
 namespace fathom::deep {
 
@@ -150,18 +151,13 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
 float meanLevel(const DeepImage& image) {
   const flat::Image flattened = flatten(image);
   const flat::Plane& alpha = flattened.get("A");
-  double sum = 0;
-  size_t count = 0;
+  flat::LevelSum level;
   for (const char* name : kRgb) {
     const flat::Plane& plane = flattened.get(name);
-    for (size_t i = 0; i < plane.values.size(); ++i) {
-      if (!(alpha.values[i] > 0) || !isFinite(plane.values[i])) continue;
-      sum += double(plane.values[i]);
-      ++count;
-    }
+    for (size_t i = 0; i < plane.values.size(); ++i)
+      if (alpha.values[i] > 0) level.add(double(plane.values[i]));
   }
-  const double mean = count ? sum / double(count) : 0;
-  return mean > 1e-20 && mean < double(kLargest) ? float(mean) : 0.5f;
+  return level.result();
 }
 
 int denoiseHalo(const DenoisePlan& plan) {

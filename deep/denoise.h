@@ -65,7 +65,7 @@ struct DenoisePlan {
   bool guided = false;  // every image comes with a guide
 };
 
-// The mean of the flattened R, G and B over the pixels with alpha, from finite values; 0.5 where there is none.
+// The level (flat/level) of the flattened R, G and B of the pixels with alpha.
 float meanLevel(const DeepImage& image);
 
 // How many rows above and below a row decide its result: bands need that much around them.

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "flat/bilateral.h"
 #include "flat/finite.h"
+#include "flat/level.h"
 
 namespace fathom::flat {
 
@@ -42,9 +43,17 @@ struct Prior {
 };
 
 Prior priorOf(const ErrorEstimate& estimate, const Noise& noise, float mostRatio) {
+  const auto sizeOf = [&](size_t c, size_t i) {
+    return std::fabs(estimate.error[c][i]) + estimate.spread[c][i] + noise.variance[c][i];
+  };
+  LevelSum sizes;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < estimate.error[c].size(); ++i) sizes.add(double(sizeOf(c, i)));
+  const double limit = std::min(sizes.limit(kAbsurd), double(kLargest));
   double sure = 0, spread = 0, variance = 0;
   for (size_t c = 0; c < 3; ++c)
     for (size_t i = 0; i < estimate.error[c].size(); ++i) {
+      if (!(double(sizeOf(c, i)) < limit)) continue;
       sure += double(estimate.error[c][i]);
       spread += double(estimate.spread[c][i]);
       variance += double(noise.variance[c][i]);

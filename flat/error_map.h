@@ -6,7 +6,8 @@
 // - Means are taken over 11x11 pixels where the denoised colours are alike (flat/bilateral): light and dark do not mix.
 // - The error is the filtered value's variance and its squared bias, and the former (ErrorEstimate::spread) is known
 //   well. P = ratio * spread is taken as a first guess, with one ratio for the frame, that of the sums of SURE and
-//   spread; its standard deviation is taken to be as large as itself.
+//   spread (but for what is a million times the rest, see flat/level); its standard deviation is taken to be as large as
+//   itself.
 // - A, the smoothed SURE, has variance N = noiseFactor sum w^2 s^4 / (sum w)^2. The map is the mean of both, weighted
 //   by the inverses of their variances: (A P^2 + P N) / (P^2 + N), and at least half the spread.
 // Measured (docs/notes.md): rank correlation 0.87 on average where smoothed SURE has 0.58.

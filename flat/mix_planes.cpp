@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "flat/finite.h"
+#include "flat/level.h"
 #include "flat/neural_planes.h"
 
 namespace fathom::flat {
@@ -42,14 +43,11 @@ float exposed(float value, float scale) {
 }
 
 double meanDepth(const Plane* plane) {
-  double sum = 0, hits = 0;
-  if (plane)
-    for (const float value : plane->values)
-      if (const float z = finiteOrZero(value); z > 0) {
-        sum += double(z);
-        ++hits;
-      }
-  return hits > 0 ? sum / hits : 1;
+  LevelSum depths;
+  for (size_t i = 0; plane && i < plane->values.size(); ++i)
+    if (plane->values[i] > 0) depths.add(double(plane->values[i]));
+  const double mean = depths.mean(kAbsurd);
+  return mean > 0 ? mean : 1;
 }
 
 class Source {
@@ -67,10 +65,10 @@ class Source {
         meanDepth_(float(meanDepth(depth_))) {
     for (const Candidate& candidate : candidates) {
       y_.push_back(find(candidate.denoised, ""));
-      double sum = 0;
+      LevelSum errors;
       for (size_t i = 0; i < candidate.k.size(); ++i)
-        sum += double(relative(candidate.map.error, i, levelOf(y_.back(), i)));
-      frame_.push_back(logarithm(float(sum / double(std::max<size_t>(candidate.k.size(), 1)))));
+        errors.add(double(relative(candidate.map.error, i, levelOf(y_.back(), i))));
+      frame_.push_back(logarithm(float(errors.mean(kAbsurd))));
     }
   }
 

@@ -11,7 +11,7 @@
 //              10   x's relative variance                    8    the gate's k
 //              11   log2(samples) / 4 - 1                    9    as 3, of the frame's mean
 //
-// Values that are not finite count as 0.
+// Values that are not finite count as 0; in means over the frame the absurd do not (flat/level), which training never sees.
 #pragma once
 
 #include <span>

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "flat/finite.h"
+#include "flat/level.h"
 #include "nn/colour_kernel.h"
 
 namespace fathom::flat {
@@ -109,15 +110,11 @@ Variances variancesOf(const Image& image, Light light) {
 }
 
 float meanDepth(const Plane& plane) {
-  double sum = 0;
-  size_t hits = 0;
-  for (const float value : plane.values) {
-    const float z = finiteOrZero(value);
-    if (!(z > 0)) continue;
-    sum += double(z);
-    ++hits;
-  }
-  return hits ? float(sum / double(hits)) : 1.0f;
+  LevelSum depths;
+  for (const float value : plane.values)
+    if (value > 0) depths.add(double(value));
+  const auto mean = float(depths.mean(kAbsurd));
+  return mean > 0 ? mean : 1.0f;
 }
 
 }  // namespace
@@ -149,9 +146,10 @@ float exposureOf(const Image& image) {
   });
   std::erase_if(means, [](double mean) { return !(mean > 0); });
   if (means.empty()) return 1;
-  double all = 0, logarithms = 0;
-  for (const double mean : means) all += mean;
-  const double least = kTinyBlock * all / double(means.size());
+  LevelSum all;
+  for (const double mean : means) all.add(mean);
+  const double least = kTinyBlock * all.mean(kAbsurd);
+  double logarithms = 0;
   for (const double mean : means) logarithms += std::log(std::max(mean, least));
   return float(std::min(double(kKey) / std::exp(logarithms / double(means.size())), double(kMostExposed)));
 }

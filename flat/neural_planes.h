@@ -32,7 +32,7 @@ std::string prefixOf(Light light);
 bool hasLight(const Image& image, Light light);
 
 // The factor that brings the geometric mean of the luminances of 8x8 blocks to 0.2; blocks without light do not count, and
-// the darkest ones count as a thousandth of the mean. 1 for a black frame.
+// the darkest ones count as a thousandth of the mean (of all but the absurd, see flat/level). 1 for a black frame.
 float exposureOf(const Image& image);
 
 // The planes of one image, of one light at a time. Values that are not finite count as 0.

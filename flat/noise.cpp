@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "flat/finite.h"
+#include "flat/level.h"
 
 namespace fathom::flat {
 
@@ -48,17 +49,11 @@ void fromHalves(const Image& image, Noise& noise) {
   }
 }
 
-float meanOf(const std::array<const Plane*, 3>& colour) {
-  double sum = 0;
-  size_t count = 0;
+float levelOf(const std::array<const Plane*, 3>& colour) {
+  LevelSum level;
   for (const Plane* plane : colour)
-    for (const float v : plane->values) {
-      if (!isFinite(v)) continue;
-      sum += double(v);
-      ++count;
-    }
-  const double mean = count ? sum / double(count) : 0;
-  return mean > 1e-20 && mean < double(kLargest) ? float(mean) : 0.5f;
+    for (const float v : plane->values) level.add(double(v));
+  return level.result();
 }
 
 // Black pixels beside others that are not are not taken for converged.
@@ -96,7 +91,7 @@ Noise noiseOf(const Image& image) {
   const size_t pixels = image.dataWindow.area();
   const std::array<const Plane*, 3> colour{&image.get("R"), &image.get("G"), &image.get("B")};
   Noise noise;
-  noise.level = meanOf(colour);
+  noise.level = levelOf(colour);
   noise.pixel = Buffer<PixelNoise>(pixels);
   noise.samples = Buffer<float>(pixels, 1.0f);
   const bool variances = hasVariances(image);

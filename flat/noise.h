@@ -24,7 +24,7 @@ struct Noise {
   std::array<Buffer<float>, 3> variance;  // of the means R, G, B as the file has them; finite, 0 where not Known
   Buffer<PixelNoise> pixel;
   Buffer<float> samples;  // camera samples, 1 at least; 1 where the file does not tell
-  float level = 0.5f;     // the mean of the finite colours, which constants scale with; 0.5 where that is nothing
+  float level = 0.5f;     // of the finite colours, which constants scale with (flat/level)
 };
 
 // The attribute fathom:spp; 0: the image does not tell.

@@ -1,0 +1,409 @@
+// Estimated errors, gates and mixes of flat frames: against their formulas on values at the ends of what files hold, and their
+// laws.
+#include "flat/progressive.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "deep/flat_nl_means.h"
+#include "flat/finite.h"
+#include "flat/level.h"
+#include "tests/reference/bilateral.h"
+#include "tests/reference/flat_gate.h"
+#include "tests/reference/noisy_flat.h"
+#include "tests/stress/extreme_noisy.h"
+#include "tests/stress/record.h"
+
+namespace fathom::flat {
+namespace {
+
+using reference::boxDenoiser;
+using reference::makeNoisyFlat;
+using stress::extremeFlat;
+using stress::record;
+
+constexpr std::pair<int, int> kShapes[] = {{1, 1}, {1, 23}, {31, 1}, {22, 17}};
+constexpr float kLargest[] = {6e4f, 1e7f, 9e14f};
+
+double valueAt(const Image& image, const std::string& name, size_t i) {
+  return double(image.get(name).values[i]);
+}
+
+// A frame, and what a box mean makes of it.
+struct Scene {
+  Image noisy, denoised;
+  Noise noise;
+
+  Scene(int width, int height, unsigned seed, float largest, bool fromHalves = false)
+      : noisy(extremeFlat({.width = width, .height = height, .seed = seed, .largest = largest})),
+        denoised(reference::boxMean(noisy)) {
+    if (fromHalves) std::erase_if(noisy.planes, [](const Plane& plane) { return plane.name.starts_with("variance."); });
+    noise = noiseOf(noisy);
+  }
+  size_t pixels() const { return noisy.dataWindow.area(); }
+};
+
+// Calls look(scene) for frames of all shapes and magnitudes.
+template <class Look>
+void forScenes(const Look& look) {
+  for (int round = 0; round < stress::rounds(); ++round)
+    for (const auto& [width, height] : kShapes)
+      for (const float largest : kLargest)
+        for (const bool fromHalves : {false, true}) {
+          SCOPED_TRACE(testing::Message()
+                       << width << "x" << height << " to " << largest << (fromHalves ? ", halves" : ""));
+          look(Scene(width, height, unsigned(13 * round + width), largest, fromHalves));
+        }
+}
+
+// Variances of means from two halves, and what they are called.
+TEST(StressProgressive, NoiseIsReadAsItsFormulasHaveIt) {
+  constexpr double kBound = 1e-6;
+  double worst = 0;
+  forScenes([&](const Scene& scene) {
+    const Image& image = scene.noisy;
+    const bool told = image.find("variance.R");
+    for (size_t i = 0; i < scene.pixels(); ++i) {
+      if (scene.noise.pixel[i] != PixelNoise::Known) continue;
+      const double n0 = valueAt(image, "half0.samples", i), n1 = valueAt(image, "half1.samples", i), n = n0 + n1;
+      for (size_t c = 0; c < 3; ++c) {
+        const double a = valueAt(image, std::string("half0.") + kRgbNames[c], i),
+                     b = valueAt(image, std::string("half1.") + kRgbNames[c], i);
+        // The difference of two floats is exact where they are alike.
+        const double d = double(float(a - b));
+        const double expected = told               ? valueAt(image, std::string("variance.") + kRgbNames[c], i)
+                                : n0 > 0 && n1 > 0 ? n0 / n * (n1 / n) * d * d
+                                                   : 0;
+        worst = std::max(worst, std::fabs(double(scene.noise.variance[c][i]) - expected) / (expected + 1e-37));
+      }
+    }
+  });
+  record("noise of flat frames", "values, halves of any counts", worst, kBound);
+  EXPECT_LT(worst, kBound);
+}
+
+// SURE from a response, relative to the sum of the absolute values of its terms.
+TEST(StressProgressive, TheErrorEstimateEqualsItsFormula) {
+  constexpr double kBound = 1e-6;
+  double worst = 0;
+  forScenes([&](const Scene& scene) {
+    NoiseResponse response;
+    stress::Draw draw(3);
+    for (size_t c = 0; c < 3; ++c) {
+      response.covariance[c] = Buffer<float>(scene.pixels());
+      response.spread[c] = Buffer<float>(scene.pixels());
+      for (size_t i = 0; i < scene.pixels(); ++i) {
+        response.covariance[c][i] = scene.noise.variance[c][i] * float(draw.uniform(-0.1, 1));
+        response.spread[c][i] = scene.noise.variance[c][i] * float(draw.uniform());
+      }
+    }
+    NoiseResponse copy{{response.covariance[0].copy(), response.covariance[1].copy(), response.covariance[2].copy()},
+                       {response.spread[0].copy(), response.spread[1].copy(), response.spread[2].copy()}};
+    const ErrorEstimate found = estimateError(scene.noisy, scene.noise, scene.denoised, std::move(copy));
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = 0; i < scene.pixels(); ++i) {
+        const double r =
+            double(float(valueAt(scene.denoised, kRgbNames[c], i) - valueAt(scene.noisy, kRgbNames[c], i)));
+        const double v = double(scene.noise.variance[c][i]), f = double(response.covariance[c][i]);
+        const bool known = scene.noise.pixel[i] == PixelNoise::Known;
+        const double error = r * r - v + 2 * (known ? f : 0), all = r * r + v + 2 * std::fabs(f);
+        const bool told = scene.noise.pixel[i] != PixelNoise::Unknown && std::fabs(error) <= 1e15;
+        if (std::fabs(std::fabs(error) / 1e15 - 1) < 1e-5) continue;  // on the edge of what counts as finite
+        const double expected = told ? error : double(response.spread[c][i]);
+        worst = std::max(worst, std::fabs(double(found.error[c][i]) - expected) / (all + 1e-36));
+      }
+  });
+  record("SURE", "values, variance 0 and huge, 0 to 10,000 samples", worst, kBound);
+  EXPECT_LT(worst, kBound);
+}
+
+Padded padded(const Box& window, const Buffer<float>& values, double largest) {
+  Padded result(window.width(), window.height(), 5);
+  for (int y = 0; y < window.height(); ++y)
+    for (int x = 0; x < window.width(); ++x) {
+      const float v = values[size_t(y * window.width() + x)];
+      result.row(y)[x] = std::fabs(double(v)) <= largest ? v : 0;
+    }
+  result.extend();
+  return result;
+}
+
+// The map from SURE, spread and variance, by flat/error_map.h. Of a variance of a mean what is beyond 1e15 counts as that.
+TEST(StressProgressive, TheErrorMapEqualsItsTwin) {
+  constexpr double kBound = 1e-4;
+  double worst = 0;
+  forScenes([&](const Scene& scene) {
+    const Box& window = scene.noisy.dataWindow;
+    const ErrorEstimate e = estimateError(scene.noisy, scene.noise, scene.denoised, boxDenoiser());
+    const ErrorMap map = mapErrors(e, scene.noise, scene.denoised);
+    LevelSum all;
+    const auto sizeOf = [&](size_t c, size_t i) {
+      return std::fabs(e.error[c][i]) + e.spread[c][i] + scene.noise.variance[c][i];
+    };
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = 0; i < scene.pixels(); ++i) all.add(double(sizeOf(c, i)));
+    const double limit = std::min(all.limit(kAbsurd), 1e15);
+    double sure = 0, spread = 0, variance = 0;
+    std::vector<Padded> guide;
+    for (size_t c = 0; c < 3; ++c) {
+      guide.push_back(padded(window, scene.denoised.get(kRgbNames[c]).values, 1e15));
+      for (size_t i = 0; i < scene.pixels(); ++i) {
+        if (!(double(sizeOf(c, i)) < limit)) continue;
+        sure += double(e.error[c][i]);
+        spread += double(e.spread[c][i]);
+        variance += double(scene.noise.variance[c][i]);
+      }
+    }
+    const double ratio = spread > 0 ? std::clamp(sure / spread, 1.0, 100.0) : 1;
+    const double rest = variance > 0 ? std::max(0.0, sure - ratio * spread) / variance : 0;
+    BilateralParams params{.radius = 5, .sigma = 2.5f, .sharpness = 2};
+    params.floor = 4e-4f * scene.noise.level * scene.noise.level;
+    for (size_t c = 0; c < 3; ++c) {
+      Buffer<float> squares(scene.pixels());
+      for (size_t i = 0; i < squares.size(); ++i) squares[i] = scene.noise.variance[c][i] * scene.noise.variance[c][i];
+      std::vector<Padded> in, square, sizes;
+      for (const auto* values : {&e.error[c], &e.spread[c], &scene.noise.variance[c], &e.covariance[c]}) {
+        in.push_back(padded(window, *values, 1e30));
+        sizes.push_back(padded(window, *values, 1e30));
+        for (int y = 0; y < window.height(); ++y)
+          for (int x = 0; x < window.width(); ++x) sizes.back().row(y)[x] = std::fabs(sizes.back().row(y)[x]);
+        sizes.back().extend();
+      }
+      square.push_back(padded(window, squares, 2e30));
+      for (int y = 0; y < window.height(); ++y)
+        for (int x = 0; x < window.width(); ++x) {
+          const auto mean = reference::bilateral(x, y, params, guide, in),
+                     size = reference::bilateral(x, y, params, guide, sizes);
+          const double n = 4 * reference::bilateral(x, y, params, guide, square, true)[0];
+          const double p = ratio * mean[1] + rest * mean[2], weight = p * p + n;
+          const double error =
+              std::max(weight > 0 ? (mean[0] * p * p + p * n) / weight : std::max(mean[0], 0.0), 0.5 * mean[1]);
+          const size_t i = size_t(y * window.width() + x);
+          const double least = 1e-12 * double(scene.noise.level) * double(scene.noise.level);
+          worst = std::max(worst, std::fabs(double(map.error[c][i]) - error) / (size[0] + size[1] + size[2] + least));
+          worst = std::max(worst, std::fabs(double(map.variance[c][i]) - mean[2]) / (mean[2] + least));
+          ASSERT_TRUE(map.error[c][i] >= 0 && std::isfinite(map.error[c][i]));
+        }
+    }
+  });
+  record("error map", "values, variance 0 and huge, 0 to 10,000 samples", worst, kBound);
+  EXPECT_LT(worst, kBound);
+}
+
+// Pixels of which all is known, as the twin takes them.
+TEST(StressProgressive, TheGateOnPixelsEqualsItsTwin) {
+  constexpr double kBound = 1e-4;
+  double worst = 0;
+  forScenes([&](const Scene& whole) {
+    Scene scene(whole.noisy.dataWindow.width(), whole.noisy.dataWindow.height(), 5, 6e4f);
+    stress::Draw draw(unsigned(whole.pixels()));
+    for (size_t i = 0; i < scene.pixels(); ++i) {
+      scene.noise.pixel[i] = PixelNoise::Known;
+      scene.noise.samples[i] = draw.of({1, 2, 64, 10000});
+      for (size_t c = 0; c < 3; ++c) {
+        const double x = valueAt(whole.noisy, kRgbNames[c], i);
+        scene.noisy.find(kRgbNames[c])->values[i] = finiteOrZero(float(x));
+        scene.noise.variance[c][i] = draw.below(5) ? float(std::min(x * x * draw.power(1e-6, 1), 1e15)) : 0;
+      }
+    }
+    scene.denoised = reference::boxMean(scene.noisy);
+    scene.noise.level = whole.noise.level;
+    const Buffer<float> k = gate(scene.noisy, scene.noise, scene.denoised);
+    const int width = scene.noisy.dataWindow.width();
+    for (size_t i = 0; i < scene.pixels(); ++i) {
+      const double expected =
+          reference::gate(scene.noisy, scene.noise, scene.denoised, int(i) % width, int(i) / width, 2.5);
+      ASSERT_TRUE(k[i] >= 0 && k[i] <= 1);
+      for (size_t c = 0; c < 3; ++c) {
+        const double x = valueAt(scene.noisy, kRgbNames[c], i), f = valueAt(scene.denoised, kRgbNames[c], i);
+        const double size = std::fabs(x) + std::fabs(f) + 1e-6 * double(scene.noise.level);
+        worst = std::max(worst, std::fabs(double(k[i]) - expected) * std::fabs(x - f) / size);
+      }
+    }
+  });
+  record("gate on pixels", "values, variance 0 and huge, 1 to 10,000 samples", worst, kBound);
+  EXPECT_LT(worst, kBound);
+}
+
+// Equations 8 and 9 in double precision.
+TEST(StressProgressive, TheMixEqualsItsFormula) {
+  constexpr double kBound = 1e-5;
+  double worst = 0, worstError = 0;
+  forScenes([&](const Scene& scene) {
+    const ErrorEstimate e = estimateError(scene.noisy, scene.noise, scene.denoised, boxDenoiser());
+    const ErrorMap map = mapErrors(e, scene.noise, scene.denoised);
+    const Buffer<float> k = gate(scene.noisy, scene.noise, scene.denoised);
+    const Image result = mix(scene.noisy, scene.noise, scene.denoised, map, k);
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t i = 0; i < scene.pixels(); ++i) {
+        const double x = valueAt(scene.noisy, kRgbNames[c], i), y = valueAt(scene.denoised, kRgbNames[c], i);
+        const double found = valueAt(result, kRgbNames[c], i);
+        ASSERT_TRUE(std::isfinite(found));
+        if (scene.noise.pixel[i] == PixelNoise::Converged) {
+          ASSERT_EQ(found, x);
+          continue;
+        }
+        if (scene.noise.pixel[i] == PixelNoise::Unknown || std::fabs(y) > 1e15) continue;
+        const double error = map.error[c][i], v = map.variance[c][i], f = map.covariance[c][i];
+        const double n = scene.noise.samples[i], doubt = n > 1 ? (n + 11) / (n - 1) : 1;
+        const double s = doubt * std::max(v, double(scene.noise.variance[c][i]));
+        const double ours = std::max(s - f, 0.0), theirs = std::max(error - f, 0.0);
+        const double a = std::min(theirs > 0 ? ours / (ours + theirs) : 1.0, 1 - double(k[i]) / doubt);
+        worst = std::max(worst, std::fabs(found - (x + a * (y - x))) / (std::fabs(x) + std::fabs(y) + 1e-36));
+        const double told = std::max(0.0, (1 - a) * (1 - a) * v + a * a * error + 2 * a * (1 - a) * f);
+        worstError = std::max(worstError, std::fabs(valueAt(result, std::string("error.") + kRgbNames[c], i) - told) /
+                                              (v + error + 1e-36));
+      }
+  });
+  record("progressive mix", "values, variance 0 and huge, 0 to 10,000 samples", worst, kBound);
+  record("progressive mix, its error", "values, variance 0 and huge, 0 to 10,000 samples", worstError, kBound);
+  EXPECT_LT(worst, kBound);
+  EXPECT_LT(worstError, kBound);
+}
+
+std::shared_ptr<const nn::MixNet> learnedMix() {
+  static const auto net = std::make_shared<const nn::MixNet>(nn::readWeights(FATHOM_DEMO "/../models/mix.safetensors"));
+  return net;
+}
+
+// Our filter and a box mean, mixed with the render.
+Image progressive(const Image& noisy, bool learned) {
+  const Estimator estimators[] = {deep::nlMeansEstimator(deep::planFlat(noisy, {.gate = false})),
+                                  byProbes(boxDenoiser())};
+  ProgressiveParams params;
+  if (learned) params.net = learnedMix();
+  return denoiseProgressively(noisy, estimators, params);
+}
+
+// A frame with holes: converged, unknown and black pixels.
+Image brokenFrame(int width, int height, unsigned seed) {
+  Image noisy = makeNoisyFlat(width, height, seed).noisy;
+  noisy.add("A", 1);
+  noisy.add("Z", 3);
+  noisy.add("samples", 16);
+  for (Plane& plane : noisy.planes)
+    for (size_t i = 0; i < plane.values.size(); ++i) {
+      if (i % 53 == 7 && plane.name.starts_with("variance.")) plane.values[i] = 0;
+      if (i % 47 == 11 && plane.name == "samples") plane.values[i] = 1;
+      if (i % 43 == 5 && stress::factorOf(plane.name, 2) > 1) plane.values[i] = 0;
+    }
+  return noisy;
+}
+
+double farthest(const Image& a, const Image& b, double level, double scale = 1) {
+  double worst = 0;
+  for (const char* name : kRgbNames)
+    for (size_t i = 0; i < a.dataWindow.area(); ++i) {
+      const double x = valueAt(a, name, i), y = valueAt(b, name, i) / scale;
+      worst = std::max(worst, std::fabs(x - y) / std::max(std::fabs(x), 0.01 * level));
+    }
+  return worst;
+}
+
+TEST(StressProgressive, FollowsTheExposure) {
+  constexpr double kBound = 1e-4;
+  for (const bool learned : {false, true}) {
+    double worst = 0;
+    for (int round = 0; round < stress::rounds(); ++round) {
+      const Image noisy = brokenFrame(34, 27, unsigned(round + 1));
+      const Image expected = progressive(noisy, learned);
+      for (const std::span<const float> scales : {std::span(stress::kExactScales), std::span(stress::kRoundedScales)})
+        for (const float scale : scales) {
+          const Image found = progressive(stress::scaled(noisy, scale), learned);
+          const double far = farthest(expected, found, 0.5, double(scale));
+          EXPECT_LT(far, kBound) << scale << (learned ? ", learned" : "");
+          worst = std::max(worst, far);
+          for (const std::string name : kRgbNames)  // and its squares
+            for (size_t i = 0; i < noisy.dataWindow.area(); ++i) {
+              const double e = valueAt(expected, "error." + name, i);
+              ASSERT_NEAR(valueAt(found, "error." + name, i) / double(scale) / double(scale), e, 1e-3 * e + 1e-7);
+            }
+        }
+    }
+    record(learned ? "progressive, learned mix" : "progressive, formula", "exposure over 12 powers of ten", worst,
+           kBound);
+  }
+}
+
+TEST(StressProgressive, AnyFrameGivesFiniteColours) {
+  for (const bool learned : {false, true})
+    forScenes([&](const Scene& scene) {
+      const Image found = progressive(scene.noisy, learned);
+      for (const Plane& plane : found.planes)
+        for (const float v : plane.values) ASSERT_TRUE(std::isfinite(v)) << plane.name;
+    });
+}
+
+// Level, exposure and the ratio of SURE to spread are of the whole frame, and one pixel has its share in them: of some twenty
+// thousand, a few hundredths. (Absurd values took over before flat/level left them out: up to 13 times the colours.) The
+// learned mix sees 40 pixels far.
+TEST(StressProgressive, PoisonStaysWithinReach) {
+  constexpr float kPoisons[] = {stress::kNan, stress::kInfinity, -stress::kInfinity, -1, -1e10f, 1e20f, 9e14f, 1e-42f};
+  constexpr double kBound = 0.1;
+  constexpr int kLength = 280, kHeight = 72, kReach = 70;
+  for (const bool learned : {false, true}) {
+    double worst = 0;
+    const Image clean = brokenFrame(kLength, kHeight, 1);
+    const Image expected = progressive(clean, learned);
+    stress::Draw draw(5);
+    for (int round = 0; round < 16 * stress::rounds(); ++round) {
+      Image image = clean.copy();
+      const size_t x = draw.below(kLength), i = x + kLength * draw.below(kHeight);
+      const std::string name = image.planes[draw.below(unsigned(image.planes.size()))].name;
+      const bool all = draw.below(4) == 0;
+      const std::string start = all ? name.substr(0, name.find('.')) : name;
+      const float value = kPoisons[draw.below(unsigned(std::size(kPoisons)))];
+      SCOPED_TRACE(testing::Message() << start << " " << value << " at " << x);
+      for (Plane& plane : image.planes)
+        if (plane.name.starts_with(start)) plane.values[i] = value;
+      const Image found = progressive(image, learned);
+      for (const Plane& plane : found.planes)
+        for (const float v : plane.values) ASSERT_TRUE(std::isfinite(v)) << plane.name;
+      for (const char* c : kRgbNames)
+        for (size_t p = 0; p < image.dataWindow.area(); ++p) {
+          if (std::abs(int(p % kLength) - int(x)) <= kReach) continue;
+          const double was = valueAt(expected, c, p),
+                       far = std::fabs(valueAt(found, c, p) - was) / std::max(was, 0.005);
+          ASSERT_LT(far, kBound) << c << " at " << p % kLength;
+          worst = std::max(worst, far);
+        }
+    }
+    record(learned ? "progressive, learned mix" : "progressive, formula",
+           "poison: what moves out of reach, by sums over the frame", worst, kBound);
+  }
+}
+
+// Our filter by itself on flat pixels has no sums over the frame but its plan's.
+TEST(StressProgressive, TheFlatFilterKeepsPoisonAndWindows) {
+  constexpr int kLength = 150;
+  const Image clean = brokenFrame(kLength, 6, 1);
+  const deep::DenoisePlan plan = deep::planFlat(clean, {});
+  const Image expected = flatNlMeans(plan)(clean, {});
+  const int halo = denoiseHalo(plan);
+  for (int round = 0; round < 30; ++round) {
+    Image image = clean.copy();
+    stress::Draw draw(unsigned(round) + 77);
+    const size_t x = draw.below(kLength), i = x + kLength * draw.below(6);
+    for (Plane& plane : image.planes)
+      if (draw.below(3) == 0) plane.values[i] = draw.of({stress::kNan, stress::kInfinity, -1e10f, 9e14f, -1e20f});
+    const Image found = flatNlMeans(plan)(image, {});
+    for (const char* c : kRgbNames)
+      for (size_t p = 0; p < image.dataWindow.area(); ++p) {
+        const float v = found.get(c).values[p];
+        ASSERT_TRUE(std::isfinite(v));
+        if (std::abs(int(p % kLength) - int(x)) > halo) {
+          ASSERT_TRUE(stress::sameBits(v, expected.get(c).values[p])) << p % kLength << " from " << x;
+        }
+      }
+  }
+  for (const auto& [dx, dy] : {std::pair{1, 2}, {-1003, 77}}) {
+    Image shifted = clean.copy();
+    shifted.dataWindow = {clean.dataWindow.x0 + dx, clean.dataWindow.y0 + dy, clean.dataWindow.x1 + dx,
+                          clean.dataWindow.y1 + dy};
+    EXPECT_EQ(farthest(expected, flatNlMeans(plan)(shifted, {}), 0.5), 0);
+  }
+}
+
+}  // namespace
+}  // namespace fathom::flat
