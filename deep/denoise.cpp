@@ -11,14 +11,13 @@
 #include "deep/filter_bank.h"
 #include "deep/flatten.h"
 #include "deep/gate.h"
+#include "deep/mean_level.h"
 #include "deep/noise_response.h"
 #include "deep/still.h"
 
 namespace fathom::deep {
 
 namespace {
-
-constexpr std::array<const char*, 3> kRgb{"R", "G", "B"};
 
 // Writes the seconds since the last lap under a stage's name.
 class Clock {
@@ -148,20 +147,9 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
 }
 
 float meanLevel(const DeepImage& image) {
-  const flat::Image flattened = flatten(image);
-  const flat::Plane& alpha = flattened.get("A");
-  double sum = 0;
-  size_t count = 0;
-  for (const char* name : kRgb) {
-    const flat::Plane& plane = flattened.get(name);
-    for (size_t i = 0; i < plane.values.size(); ++i) {
-      if (!(alpha.values[i] > 0) || !isFinite(plane.values[i])) continue;
-      sum += double(plane.values[i]);
-      ++count;
-    }
-  }
-  const double mean = count ? sum / double(count) : 0;
-  return mean > 1e-20 && mean < double(kLargest) ? float(mean) : 0.5f;
+  MeanLevel level;
+  level.add(image);
+  return level.value();
 }
 
 int denoiseHalo(const DenoisePlan& plan) {
