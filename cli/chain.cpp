@@ -157,7 +157,7 @@ void expand(std::span<const std::string> words, int depth, size_t& left, std::ve
 }
 
 std::string quoted(const std::string& word) {
-  if (!word.empty() && word[0] != '#' && word.find_first_of(" \t\r\n\"\\") == word.npos) return word;
+  if (!word.empty() && word[0] != '#' && word.find_first_of(" \t\r\n\v\f\"\\") == word.npos) return word;
   std::string text = "\"";
   for (const char c : word) {
     if (c == '"' || c == '\\') text += '\\';

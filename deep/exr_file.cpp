@@ -2,8 +2,9 @@
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfTileDescription.h>
 #include <OpenEXR/ImfVersion.h>
 #include <fcntl.h>
@@ -159,6 +160,14 @@ void settleType(Imf::Header& header, int version, bool multiPart) {
     header.setType(Imf::isTiled(version) ? Imf::TILEDIMAGE : Imf::SCANLINEIMAGE);
 }
 
+// Standard attributes of another type than theirs say nothing, and could not be set where the header is written again.
+void dropMistyped(Imf::Header& header) {
+  for (const char* name : {"name", "view"})
+    if (!header.findTypedAttribute<Imf::StringAttribute>(name)) eraseAttribute(header, name);
+  for (const char* name : {"version", "chunkCount", "maxSamplesPerPixel"})
+    if (!header.findTypedAttribute<Imf::IntAttribute>(name)) eraseAttribute(header, name);
+}
+
 }  // namespace
 
 ExrFile::ExrFile(const std::string& path) : file_(path) {
@@ -184,6 +193,7 @@ void ExrFile::readHeaders() {
   while (checkHeader(stream, file_)) {
     Imf::Header header;
     header.readFrom(stream, version);
+    dropMistyped(header);
     settleType(header, version, multiPart_);
     if (!header.hasType()) fail("{}, part {}: attribute type: expected, found none", path, parts_.size());
     header.sanityCheck(Imf::isTiled(header.type()), multiPart_);

@@ -9,8 +9,8 @@
 namespace fathom {
 namespace {
 
-constexpr int kWidth = 256, kHeight = 1024, kSamples = 80, kBandRows = 64;
-constexpr uint64_t kMemory = uint64_t(300) << 20;
+constexpr int kWidth = 128, kHeight = 1024, kSamples = 80, kBandRows = 64;
+constexpr uint64_t kMemory = uint64_t(180) << 20;
 
 // Rows [y0, y1) of the frame: two surfaces, in every fourth pixel the nearer one alone, with grain.
 deep::DeepImage bandOf(int y0, int y1) {
@@ -51,9 +51,9 @@ TEST(DenoiseMemory, CameraSamplesOfMoreThanTheMemoryGoThroughWithinIt) {
     EXPECT_EQ(ran.status, 0) << ran.err;
     return uint64_t(nlohmann::json::parse(textOf(folder / "stats.json"))["peakMemory"]);
   };
-  EXPECT_LE(denoise("300M"), kMemory);
+  EXPECT_LE(denoise("180M"), kMemory);
   denoise("8G");
-  EXPECT_TRUE(textOf(folder / "300M.exr") == textOf(folder / "8G.exr"));
+  EXPECT_TRUE(textOf(folder / "180M.exr") == textOf(folder / "8G.exr"));
 }
 
 }  // namespace

@@ -155,6 +155,14 @@ TEST_F(Damaged, AttributesWhoseSizeIsNotThatOfWhatIsInThem) {
               HasSubstr("attribute screenWindowCenter: expected 8 bytes for its type v2f, found 4"));
 }
 
+TEST_F(Damaged, StandardAttributesOfAnotherTypeAreNoHindranceToWriting) {
+  make(Compression::Zips);
+  for (const std::string name : {"chunkCount", "maxSamplesPerPixel", "version"}) {
+    ASSERT_EQ(errorOf(with(bytes_.find(name) + name.size() + 1, 'j')), "") << name;
+    EXPECT_NO_THROW(write(folder_ / "b.exr", read(path_))) << name;
+  }
+}
+
 TEST_F(Damaged, CompressionsThatAreNotForDeepParts) {
   make(Compression::Zips);
   const size_t value = bytes_.find("compression", bytes_.find("compression") + 11) + 12 + 4;
