@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
-#include <iterator>
 #include <optional>
 
 #include "base/error.h"
@@ -12,7 +11,8 @@ namespace fathom::cli {
 
 namespace {
 
-constexpr int kDeepestChainFile = 16;  // files that name files
+constexpr int kDeepestChainFile = 16;               // files that name files
+constexpr size_t kMostChainText = size_t(1) << 20;  // bytes of all: files that name files multiply
 
 std::string nearestName(const std::string& name) {
   for (const OperationSpec& spec : operations())
@@ -33,7 +33,7 @@ class Parser {
       else if (word.starts_with("--"))
         addOperation(word.substr(2));
       else if (word.size() > 1 && word[0] == '-')
-        fail("{}: expected a file, an operation such as --flatten, or -o", word);
+        fail("{}: expected a file, an operation such as --flatten, or -o", printable(word));
       else
         addImage(word);
     }
@@ -82,7 +82,7 @@ class Parser {
     if (at_ == words_.size()) fail("-o: expected a file, found nothing");
     const std::string& file = words_[at_++];
     if (!file.ends_with(".exr") && !file.ends_with(".png"))
-      fail("-o: expected a name that ends in .exr or .png, found {}", file);
+      fail("-o: expected a name that ends in .exr or .png, found {}", printable(file));
     chain_.outputs.push_back(
         {top("-o"), parsePattern(file), Arguments("-o", specs, takeArguments(specs)).flag("half")});
   }
@@ -96,7 +96,7 @@ class Parser {
       return;
     }
     const OperationSpec* spec = findOperation(name);
-    if (!spec) fail("--{}: expected an operation, found none of that name{}", name, nearestName(name));
+    if (!spec) fail("--{}: expected an operation, found none of that name{}", printable(name), nearestName(name));
     ChainNode node{{}, {}, spec, takeArguments(spec->arguments), {}};
     const Arguments checked("--" + name, spec->arguments, node.arguments);
     node.inputs = pop("--" + name, spec->more ? std::max(stack_.size(), spec->inputs.size()) : spec->inputs.size());
@@ -125,27 +125,39 @@ class Parser {
   Chain chain_;
 };
 
-void expand(std::span<const std::string> words, int depth, std::vector<std::string>& result) {
+// What a file holds; `left`: how much of kMostChainText is, of which the file takes its part.
+std::string textOf(const std::string& path, size_t& left) {
+  std::ifstream file(path);
+  std::string text(left + 1, '\0');
+  file.read(text.data(), std::streamsize(text.size()));
+  if (!file.is_open() || file.bad())
+    fail("{}: expected the text of a chain, found a file that cannot be read", printable(path));
+  text.resize(size_t(file.gcount()));
+  if (text.size() >= left) fail("{}: expected chains of at most {} bytes, found more", printable(path), kMostChainText);
+  left -= text.size() + 1;
+  return text;
+}
+
+void expand(std::span<const std::string> words, int depth, size_t& left, std::vector<std::string>& result) {
   for (size_t i = 0; i < words.size(); ++i) {
     if (words[i] != "--chain") {
       result.push_back(words[i]);
       continue;
     }
     if (++i == words.size()) fail("--chain: expected a file, found nothing");
-    if (depth == kDeepestChainFile) fail("{}: expected chains that end, found files that name one another", words[i]);
-    std::ifstream file(words[i]);
-    if (!file) fail("{}: expected the text of a chain, found a file that cannot be read", words[i]);
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (depth == kDeepestChainFile)
+      fail("{}: expected chains that end, found files that name one another", printable(words[i]));
+    const std::string text = textOf(words[i], left);
     try {
-      expand(chainWords(text), depth + 1, result);
+      expand(chainWords(text), depth + 1, left, result);
     } catch (const Error& e) {
-      fail("{}: {}", words[i], e.what());
+      fail("{}: {}", printable(words[i]), e.what());
     }
   }
 }
 
 std::string quoted(const std::string& word) {
-  if (!word.empty() && word[0] != '#' && word.find_first_of(" \t\r\n\"\\") == word.npos) return word;
+  if (!word.empty() && word[0] != '#' && word.find_first_of(" \t\r\n\v\f\"\\") == word.npos) return word;
   std::string text = "\"";
   for (const char c : word) {
     if (c == '"' || c == '\\') text += '\\';
@@ -183,7 +195,7 @@ std::vector<std::string> chainWords(const std::string& text) {
     else
       words.back() += c == '\\' && i + 1 < text.size() ? text[++i] : c;
   }
-  if (inQuotes) fail("expected a quotation mark at the end of {}, found none", words.back());
+  if (inQuotes) fail("expected a quotation mark at the end of {}, found none", printable(words.back()));
   return words;
 }
 
@@ -199,7 +211,8 @@ std::string chainText(std::span<const std::string> words) {
 
 std::vector<std::string> withChainFiles(std::span<const std::string> words) {
   std::vector<std::string> result;
-  expand(words, 0, result);
+  size_t left = kMostChainText;
+  expand(words, 0, left, result);
   return result;
 }
 

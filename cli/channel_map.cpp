@@ -65,8 +65,8 @@ std::optional<MappedChannel> resolveChannel(const ChannelMap& map, const Channel
   }
   if (result.terms.empty()) return {};
   if (!absent.empty())
-    fail("channel map {}, {}: expected {} in the file beside {}, found none", map.name, ours, absent,
-         result.terms.front().theirs);
+    fail("channel map {}, {}: expected {} in the file beside {}, found none", map.name, printable(ours),
+         printable(absent), printable(result.terms.front().theirs));
   return result;
 }
 
@@ -86,7 +86,7 @@ ChannelMap::Line parseLine(const std::string& text) {
   std::istringstream words(text);
   std::string equals, word;
   ChannelMap::Line line;
-  if (!(words >> line.ours >> equals) || equals != "=") fail("expected ours = theirs, found '{}'", text);
+  if (!(words >> line.ours >> equals) || equals != "=") fail("expected ours = theirs, found '{}'", printable(text));
   float sign = 1;
   bool termNext = true;
   while (words >> word) {
@@ -94,16 +94,16 @@ ChannelMap::Line parseLine(const std::string& text) {
       line.terms.push_back({sign, word});
     } else if (word == "unpremultiplied") {
       line.unpremultiplied = true;
-      if (words >> word) fail("expected nothing after unpremultiplied, found '{}'", word);
+      if (words >> word) fail("expected nothing after unpremultiplied, found '{}'", printable(word));
       break;
     } else if (word == "+" || word == "-") {
       sign = word == "+" ? 1.0f : -1.0f;
     } else {
-      fail("expected + or - between channels, found '{}'", word);
+      fail("expected + or - between channels, found '{}'", printable(word));
     }
     termNext = !termNext;
   }
-  if (termNext && !line.unpremultiplied) fail("expected a channel at the end, found '{}'", text);
+  if (termNext && !line.unpremultiplied) fail("expected a channel at the end, found '{}'", printable(text));
   return line;
 }
 

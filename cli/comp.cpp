@@ -100,6 +100,7 @@ class CompRun {
         continue;
       }
       show(frame, display);
+      if (command_.stats.empty()) frame.report = {};
       done.push_back(std::move(frame));
     }
     return done;
@@ -128,7 +129,7 @@ class CompRun {
     } catch (const std::bad_alloc&) {
       done.error = "out of memory";
     } catch (const std::exception& e) {
-      done.error = e.what();
+      done.error = oneLine(e.what());
     }
     return done;
   }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <vector>
@@ -35,8 +37,9 @@ void ContentHash::add(std::string_view text) {
 void ContentHash::addFile(const std::string& path) {
   std::error_code error;
   const auto size = std::filesystem::file_size(path, error);
+  if (error) fail("{}: expected a file that can be read, found: {}", path, error.message());  // a named pipe would wait
   std::ifstream file(path, std::ios::binary);
-  if (error || !file) fail("{}: expected a file that can be read, found {}", path, error ? error.message() : "none");
+  if (!file) fail("{}: expected a file that can be read, found: {}", path, std::strerror(errno));
   const std::string length = fmt::format("{}:", size);
   addBytes(length.data(), length.size());
   std::vector<char> block(size_t(1) << 20);

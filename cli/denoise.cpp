@@ -93,6 +93,7 @@ void runDenoise(const DenoiseCommand& command) {
   const auto start = std::chrono::steady_clock::now();
   const Sequence sequence = findSequence(request.input, command.frames);
   DenoiseJob job = makeDenoiseJob(request, sequence, threads > 1);
+  job.stats = !command.stats.empty();
   for (const std::string& note : job.plan.notes) fmt::print(stderr, "{}\n", note);
   const double planSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const bool missing = reportMissing(command, sequence);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <optional>
+#include <set>
 
 #include "base/error.h"
 #include "cli/memory_limit.h"
@@ -14,6 +16,7 @@
 #include "deep/channels.h"
 #include "deep/error_estimate.h"
 #include "deep/flat_nl_means.h"
+#include "deep/mean_level.h"
 #include "deep/noise_response.h"
 
 namespace fathom::cli {
@@ -22,17 +25,52 @@ namespace {
 
 constexpr double kGuidePart = 0.4;  // of the progress on a frame that is guided
 
-// Whether every sample is one camera sample: all have the same part of their pixel, of which most have several. So says
-// the channel convention of files of samples; bins of a render differ in how many samples they hold.
-bool holdsCameraSamples(const deep::DeepImage& image) {
-  const std::optional<int> spp = image.attributes.getInt("fathom:spp");
-  const Buffer<float> share = deep::effectiveAlpha(image);
-  if (share.empty() || image.find("ZBack")) return false;
-  const float part = spp && *spp > 0 ? 1.0f / float(*spp) : share[0];
-  size_t alike = 0, filled = 0;
-  for (const float s : share) alike += std::abs(s - part) <= 1e-3f * part;
-  for (size_t pixel = 0; pixel < image.pixels(); ++pixel) filled += image.count(pixel) > 0;
-  return part <= 0.5f && double(alike) >= 0.99 * double(share.size()) && share.size() >= filled * 3 / 2;
+// What the colours of a whole frame tell, row by row: it may be larger than memory.
+class FrameLook {
+ public:
+  void add(const deep::DeepImage& rows) {
+    addLevel(rows, level_);
+    pixels_ += rows.pixels();
+    samples_ += rows.samples();
+    volumes_ = volumes_ || rows.find("ZBack");
+    const Buffer<float> share = deep::effectiveAlpha(rows);
+    const std::optional<int> spp = rows.attributes.getInt("fathom:spp");
+    if (!part_ && !share.empty()) part_ = spp && *spp > 0 ? 1.0f / float(*spp) : share[0];
+    for (const float s : share) alike_ += std::abs(s - *part_) <= 1e-3f * *part_;
+    for (size_t pixel = 0; pixel < rows.pixels(); ++pixel) filled_ += rows.count(pixel) > 0;
+  }
+
+  void tell(SequencePlan& plan) const {
+    plan.denoise.level = level_.result();
+    plan.pixels = pixels_;
+    plan.samples = samples_;
+  }
+
+  // Whether every sample is one camera sample: all have the same part of their pixel, of which most have several. So says
+  // the channel convention of files of samples; bins of a render differ in how many samples they hold.
+  bool holdsCameraSamples() const {
+    if (!part_ || volumes_) return false;
+    return *part_ <= 0.5f && double(alike_) >= 0.99 * double(samples_) && samples_ >= filled_ * 3 / 2;
+  }
+
+ private:
+  flat::LevelSum level_;
+  std::optional<float> part_;  // of its pixel that a camera sample has
+  size_t pixels_ = 0, samples_ = 0, alike_ = 0, filled_ = 0;
+  bool volumes_ = false;
+};
+
+// The frame in bands of rows that take at most `bytes` where more than one row does.
+FrameLook lookAt(FrameSource& source, size_t bytes, std::set<std::string>& notes) {
+  const Box window = source.part().dataWindow;
+  FrameLook look;
+  for (int y = window.y0; y < window.y1;) {
+    int height = window.y1 - y;
+    while (height > 1 && source.decodedBytes(y, y + height) > bytes) height = (height + 1) / 2;
+    look.add(source.read(y, y + height, notes));
+    y += height;
+  }
+  return look;
 }
 
 void findInputs(SequencePlan& plan, FrameSource& source) {
@@ -75,23 +113,20 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
   plan.deep = source.deep();
   findInputs(plan, source);
   wantInputs(plan.denoise, Statistics::OfOwnFilter, source);
-  const auto look = [&](const deep::DeepImage& image) {
-    plan.denoise.level = deep::meanLevel(image);
-    plan.pixels = image.pixels();
-    plan.samples = image.samples();
-  };
   const Box window = source.part().dataWindow;
   if (wanted && source.hasStatistics() && source.decodedBytes(window.y0, window.y1) <= decodedLimit(options.memory)) {
     plan.firstImage = source.read(plan.notes);
-    look(*plan.firstImage);
+    FrameLook look;
+    look.add(*plan.firstImage);
+    look.tell(plan);
     return plan;
   }
   source.want([](const std::string& name) {
     return name == "R" || name == "G" || name == "B" || name == "A" || name == "Z" || name == "ZBack";
   });
-  const deep::DeepImage colours = source.read(plan.notes);
-  look(colours);
-  plan.cameraSamples = plan.deep && !source.hasStatistics() && holdsCameraSamples(colours);
+  const FrameLook look = lookAt(source, decodedLimit(options.memory), plan.notes);
+  look.tell(plan);
+  plan.cameraSamples = plan.deep && !source.hasStatistics() && look.holdsCameraSamples();
   if (plan.cameraSamples) {
     plan.notes = {fmt::format("{}: one deep sample per camera sample: clustered into bins first", inputs.main)};
     source.want({});

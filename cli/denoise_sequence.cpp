@@ -60,10 +60,10 @@ class SequenceRun {
     if (chunk.error.empty() && !chunk.kept && !chunk.elsewhere) denoise(chunk, report);
     if (chunk.kept) {
       report.status = FrameReport::Status::Kept;
-      display_.frameDone(fmt::format("{}: done before", job_.frames[chunk.frame].outputs.image));
+      ended(report, fmt::format("{}: done before", job_.frames[chunk.frame].outputs.image));
     } else if (chunk.elsewhere) {
       report.status = FrameReport::Status::Elsewhere;
-      display_.frameDone(fmt::format("{}: another process is at it", job_.frames[chunk.frame].outputs.image));
+      ended(report, fmt::format("{}: another process is at it", job_.frames[chunk.frame].outputs.image));
     } else if (!chunk.error.empty()) {
       finishWriting();  // an earlier band of the same frame may be in it
       writer_.drop();
@@ -112,14 +112,19 @@ class SequenceRun {
         found != report.stats.counts.end() && found->second > 0)
       display_.tell(fmt::format("{}: {} samples without a finite colour got the filtered one",
                                 job_.frames[chunk.frame].inputs.main, found->second));
-    display_.frameDone(fmt::format("{}: {:.1f} s", job_.frames[chunk.frame].outputs.image, report.seconds));
+    ended(report, fmt::format("{}: {:.1f} s", job_.frames[chunk.frame].outputs.image, report.seconds));
   }
 
   void failed(const Chunk& chunk) {
     reports_[chunk.frame].status = FrameReport::Status::Failed;
     reports_[chunk.frame].error = chunk.error;
     display_.tell("fathom: " + chunk.error);
-    display_.frameDone("");
+    ended(reports_[chunk.frame], "");
+  }
+
+  void ended(FrameReport& report, const std::string& line) {
+    if (!job_.stats) report.stats = {};
+    display_.frameDone(line);
   }
 
   DenoiseJob job_;

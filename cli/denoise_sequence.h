@@ -27,13 +27,14 @@ struct DenoiseJob {
   bool overlap = true;     // read and write beside the work
   bool claims = false;     // claim frames, as other processes may work on the same sequence
   bool overwrite = false;  // replace outputs that were made otherwise
+  bool stats = false;      // reports keep what their frames took; over many frames, small pieces hold much of the heap
 };
 
 struct FrameReport {
   enum class Status { Done, Kept, Elsewhere, Failed };  // Elsewhere: another process makes it
   Status status = Status::Done;
   std::string error;         // one line
-  deep::DenoiseStats stats;  // of the denoiser, and the seconds of "read" and "write"
+  deep::DenoiseStats stats;  // where the job asks for them: of the denoiser, and the seconds of "read" and "write"
   double seconds = 0;        // reading, denoising and writing together
   int bands = 0;
 };

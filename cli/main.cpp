@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "fathom: out of memory\n");
   } catch (const std::exception& e) {
-    fmt::print(stderr, "fathom: {}\n", e.what());
+    fmt::print(stderr, "fathom: {}\n", fathom::oneLine(e.what()));
   }
   return kFailed;
 }

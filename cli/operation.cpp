@@ -69,6 +69,9 @@ std::string expected(const ArgumentSpec& spec, const std::string& text) {
 Arguments::Arguments(std::string_view operation, std::span<const ArgumentSpec> specs,
                      std::map<std::string, std::string> given)
     : values_(std::move(given)) {
+  for (auto& [name, value] : values_)  // line breaks, which a quoted formula may hold, would go on into errors
+    std::ranges::replace_if(
+        value, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   for (const auto& [name, value] : values_) {
     const auto spec = std::ranges::find(specs, name, &ArgumentSpec::name);
     if (spec == specs.end()) fail("{}: expected no argument {}, found {}={}", operation, name, name, value);

@@ -77,7 +77,7 @@ std::vector<std::string> chainOfOne(const OperationSpec& spec, const std::vector
         (name == "part" ? images : outputs).push_back(value);
     } else if (dashed && !complete) {
       if (!isArgument(name) || i + 1 == words.size())
-        fail("{}: expected an option that it has, with a value; found --{}", spec.name, name);
+        fail("{}: expected an option that it has, with a value; found --{}", spec.name, printable(name));
       arguments.push_back(name + "=" + words[++i]);
     } else if (!complete && (spec.more || images.size() < spec.inputs.size())) {
       images.push_back(word);

@@ -41,6 +41,7 @@ deep::Quality qualityOf(const std::string& name) {
 
 std::string describe(const PassReport& report) {
   if (report.status == PassReport::Status::Kept) return fmt::format("{}: done before", report.output);
+  if (report.status == PassReport::Status::Elsewhere) return fmt::format("{}: another process is at it", report.output);
   return fmt::format("{}: {}estimated relMSE {:.5f}, of the render {:.5f}, {:.1f} s", report.output,
                      report.spp > 0 ? fmt::format("{} spp, ", report.spp) : "", report.errors.relMse,
                      report.errors.render, report.seconds);
@@ -67,7 +68,7 @@ void runCommand(const ProgressiveCommand& command) {
   std::vector<PassReport> reports;
   {
     ProgressDisplay display(sequence.frames.size());
-    int lastSpp = 0;
+    int last = 0, lastSpp = 0;
     bool told = false;
     reports = runProgressive(request, sequence, display, interrupt.token(), [&](const PassReport& report) {
       if (report.status == PassReport::Status::Failed) {
@@ -75,9 +76,10 @@ void runCommand(const ProgressiveCommand& command) {
         return display.frameDone("");
       }
       display.frameDone(describe(report));
-      if (report.spp > 0 && report.spp <= lastSpp)
+      if (report.spp > 0 && report.spp <= lastSpp && report.pass > last)
         display.tell(fmt::format("{}: expected more than the {} samples per pixel of the pass before, found {}",
                                  report.input, lastSpp, report.spp));
+      last = report.pass;
       lastSpp = report.spp;
       if (reaches(report, command.target) && !told) tellTarget(report, *command.target, display);
       told = told || reaches(report, command.target);

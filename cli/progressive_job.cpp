@@ -5,11 +5,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <new>
 #include <optional>
 #include <set>
 
 #include "base/error.h"
+#include "cli/claim.h"
 #include "cli/content_hash.h"
 #include "cli/frame_sink.h"
 #include "cli/frame_source.h"
@@ -169,9 +172,10 @@ void expectMemory(const std::string& file, const flat::Image& noisy, const std::
 class ProgressiveRun {
  public:
   // `passes`: all that there are, of which the first that can be read decides what is left open.
-  ProgressiveRun(const ProgressiveRequest& request, const std::vector<FrameInputs>& passes, ProgressSink& display,
-                 const std::stop_token& stop)
-      : request_(request), display_(display), stop_(stop) {
+  // `claims`: other processes may work on the same passes.
+  ProgressiveRun(const ProgressiveRequest& request, const std::vector<FrameInputs>& passes, bool claims,
+                 ProgressSink& display, const std::stop_token& stop)
+      : request_(request), claims_(claims), display_(display), stop_(stop) {
     if (!request.map.empty()) options_.map = readChannelMap(request.map);
     options_.memory = request.memory;
     bases_ = basesOf(request, request.base.name == kAutoBase ? chooseBase(passes) : request.base.name);
@@ -220,21 +224,37 @@ class ProgressiveRun {
     return kOwnBase;
   }
 
+  // Whether the output is there. Throws Error where something else is.
+  bool isDone(const std::string& output, const std::string& madeBy) const {
+    const Standing standing = standingOf(output, kMadeBy, madeBy);
+    if (standing == Standing::Other && !request_.overwrite)
+      fail(
+          "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "
+          "replaces it)",
+          output);
+    return standing == Standing::Ours;
+  }
+
+  // Whoever needs what is estimated works on a pass that is there or that another process makes, too, and writes it if
+  // nobody else has.
   void work(const FrameInputs& inputs, const std::string& candidateFile, PassReport& report) {
     ContentHash hash;
     for (const std::string& text : {std::string(FATHOM_VERSION), settings_}) hash.add(text);
     for (const std::string& file : inputs.files()) hash.addFile(file);
     const std::string madeBy = fmt::format("fathom {} {:016x}", FATHOM_VERSION, hash.value());
-    const Standing standing = standingOf(report.output, kMadeBy, madeBy);
-    if (standing == Standing::Other && !request_.overwrite)
-      fail(
-          "{}: expected nothing there, or what these settings make of this input; found another file (--overwrite "
-          "replaces it)",
-          report.output);
-    if (standing == Standing::Ours && !request_.estimates && candidateFile.empty()) {
-      report.status = PassReport::Status::Kept;
-      return;
+    const bool needed = request_.estimates || !candidateFile.empty();
+    std::shared_ptr<const Claim> claim;
+    if (isDone(report.output, madeBy)) {
+      if (claims_) Claim::clear({report.output});
+      if (!needed) report.status = PassReport::Status::Kept;
+    } else if (claims_ && !needed) {
+      claim = Claim::take({report.output});
+      if (!claim)
+        report.status = PassReport::Status::Elsewhere;
+      else if (isDone(report.output, madeBy))
+        report.status = PassReport::Status::Kept;
     }
+    if (report.status != PassReport::Status::Done) return;
     flat::Image noisy = read(inputs);
     expectMemory(inputs.main, noisy, bases_, request_.memory);
     const flat::Noise noise = flat::noiseOf(noisy);
@@ -248,7 +268,8 @@ class ProgressiveRun {
     flat::Image output = outputOf(std::move(noisy), std::move(mixed), request_.errors);
     output.attributes[kMadeBy] = madeBy;
     if (!candidateFile.empty()) flat::write(candidateFile, candidatesOf(output, bases_, std::move(candidates)));
-    if (standing != Standing::Ours) flat::write(report.output, output);
+    if (claims_ && needed) claim = Claim::take({report.output});
+    if ((claim || !claims_) && !isDone(report.output, madeBy)) flat::write(report.output, output);
   }
 
   flat::Image read(const FrameInputs& inputs) {
@@ -265,6 +286,7 @@ class ProgressiveRun {
   }
 
   const ProgressiveRequest& request_;
+  const bool claims_;
   ProgressSink& display_;
   const std::stop_token stop_;
   SourceOptions options_;
@@ -292,14 +314,24 @@ std::vector<PassReport> runProgressive(const ProgressiveRequest& request, const 
   std::vector<FrameInputs> passes;
   for (const int frame : sequence.pattern.numbered() ? framesOnDisk(sequence.pattern) : sequence.frames)
     passes.push_back(inputsAt(request, sequence.pattern, frame));
-  ProgressiveRun run(request, passes, display, stop);
-  std::vector<PassReport> reports;
-  for (const int frame : sequence.frames) {
+  ProgressiveRun run(request, passes, sequence.pattern.numbered(), display, stop);
+  std::map<int, PassReport> reports;
+  std::vector<int> frames = sequence.frames;
+  for (size_t i = 0; i < frames.size(); ++i) {
     if (stop.stop_requested()) throw Cancelled();
-    reports.push_back(run.run(inputsAt(request, sequence.pattern, frame), output.at(frame), candidatesAt(frame)));
-    done(reports.back());
+    const int frame = frames[i];
+    PassReport report = run.run(inputsAt(request, sequence.pattern, frame), output.at(frame), candidatesAt(frame));
+    report.pass = frame;
+    if (report.status == PassReport::Status::Elsewhere && i < sequence.frames.size()) {
+      frames.push_back(frame);
+      continue;
+    }
+    done(report);
+    reports[frame] = std::move(report);
   }
-  return reports;
+  std::vector<PassReport> inOrder;
+  for (auto& [frame, report] : reports) inOrder.push_back(std::move(report));
+  return inOrder;
 }
 
 }  // namespace fathom::cli

@@ -32,8 +32,9 @@ struct ProgressiveRequest {
 
 // What became of one file.
 struct PassReport {
-  enum class Status { Done, Kept, Failed };
+  enum class Status { Done, Kept, Elsewhere, Failed };  // Elsewhere: another process makes it
   Status status = Status::Done;
+  int pass = 0;  // its number
   std::string input, output;
   std::string error;  // one line, where it failed
   int spp = 0;        // 0: the file does not tell
@@ -41,7 +42,8 @@ struct PassReport {
   flat::ErrorSummary errors;  // empty where it was kept
 };
 
-// One report per file, in the sequence's order. `done` hears of each. A file that fails leaves no output and does not
+// One report per file, in the sequence's order. `done` hears of each when it is done: what another process makes comes
+// again behind all others. A file that fails leaves no output and does not
 // stop the others. Throws Error and CLI::ValidationError where the request cannot be met, and Cancelled.
 std::vector<PassReport> runProgressive(const ProgressiveRequest& request, const Sequence& sequence,
                                        ProgressSink& display, const std::stop_token& stop,

@@ -103,8 +103,9 @@ FilePattern parsePattern(const std::string& path) {
   for (size_t i = name; i < path.size(); ++i) {
     const std::optional<Place> here = placeAt(path, i);
     if (!here) continue;
-    if (place) fail("{}: expected one place for the frame number, found two", path);
-    if (here->width > kMaxWidth) fail("{}: expected at most {} digits, found {}", path, kMaxWidth, here->width);
+    if (place) fail("{}: expected one place for the frame number, found two", printable(path));
+    if (here->width > kMaxWidth)
+      fail("{}: expected at most {} digits, found {}", printable(path), kMaxWidth, here->width);
     place = here;
     i = here->end - 1;
   }
@@ -119,9 +120,10 @@ std::vector<int> parseFrames(const std::string& text) {
     const size_t comma = std::min(text.find(',', begin), text.size());
     const std::string part = text.substr(begin, comma - begin);
     const std::optional<Range> range = parseRange(part);
-    if (!range) fail("frames {}: expected a form such as 7, 1-100 or 1-100x2, found '{}'", text, part);
+    if (!range)
+      fail("frames {}: expected a form such as 7, 1-100 or 1-100x2, found '{}'", printable(text), printable(part));
     if ((int64_t(range->last) - range->first) / range->step + int64_t(frames.size()) >= kMaxFrames)
-      fail("frames {}: expected at most {} frames", text, kMaxFrames);
+      fail("frames {}: expected at most {} frames", printable(text), kMaxFrames);
     for (int64_t f = range->first; f <= range->last; f += range->step) frames.push_back(int(f));
     begin = comma + 1;
   }
@@ -146,7 +148,7 @@ std::vector<int> framesOnDisk(const FilePattern& pattern) {
     const std::optional<int> frame = takeInt(digits);
     if (frame && digits.empty() && whole == fmt::format("{:0{}}", *frame, pattern.width)) frames.push_back(*frame);
   }
-  if (error) fail("{}: expected a folder that can be read, found: {}", folder.string(), error.message());
+  if (error) fail("{}: expected a folder that can be read, found: {}", printable(folder.string()), error.message());
   std::sort(frames.begin(), frames.end());
   return frames;
 }
@@ -174,7 +176,8 @@ Sequence findSequence(const std::string& path, const std::string& range) {
   Sequence sequence{parsePattern(path), {}, {}};
   if (!sequence.pattern.numbered()) {
     if (!range.empty())
-      fail("{}: expected a name such as name.####.exr for frames {}, found a plain name", path, range);
+      fail("{}: expected a name such as name.####.exr for frames {}, found a plain name", printable(path),
+           printable(range));
     sequence.frames = {0};
     return sequence;
   }
@@ -189,7 +192,8 @@ Sequence findSequence(const std::string& path, const std::string& range) {
     std::set_difference(wanted.begin(), wanted.end(), found.begin(), found.end(), std::back_inserter(sequence.missing));
   }
   if (sequence.frames.empty())
-    fail("{}: expected at least one frame{}, found none", path, range.empty() ? "" : " of " + range);
+    fail("{}: expected at least one frame{}, found none", printable(path),
+         range.empty() ? "" : " of " + printable(range));
   return sequence;
 }
 

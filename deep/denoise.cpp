@@ -11,6 +11,7 @@
 #include "deep/filter_bank.h"
 #include "deep/flatten.h"
 #include "deep/gate.h"
+#include "deep/mean_level.h"
 #include "deep/noise_response.h"
 #include "deep/still.h"
 #include "flat/level.h"
@@ -18,8 +19,6 @@
 namespace fathom::deep {
 
 namespace {
-
-constexpr std::array<const char*, 3> kRgb{"R", "G", "B"};
 
 // Writes the seconds since the last lap under a stage's name.
 class Clock {
@@ -149,14 +148,8 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
 }
 
 float meanLevel(const DeepImage& image) {
-  const flat::Image flattened = flatten(image);
-  const flat::Plane& alpha = flattened.get("A");
   flat::LevelSum level;
-  for (const char* name : kRgb) {
-    const flat::Plane& plane = flattened.get(name);
-    for (size_t i = 0; i < plane.values.size(); ++i)
-      if (alpha.values[i] > 0) level.add(double(plane.values[i]));
-  }
+  addLevel(image, level);
   return level.result();
 }
 

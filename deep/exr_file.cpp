@@ -2,8 +2,9 @@
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfTileDescription.h>
 #include <OpenEXR/ImfVersion.h>
 #include <fcntl.h>
@@ -15,6 +16,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "deep/exr_header.h"
 
 namespace fathom::deep {
 
@@ -48,84 +50,6 @@ void InputFile::read(uint64_t offset, void* to, size_t size) const {
 }
 
 namespace {
-
-// What OpenEXR reads a header from.
-class HeaderStream : public Imf::IStream {
- public:
-  HeaderStream(const InputFile& file) : IStream(file.path().c_str()), file_(file) {}
-
-  bool read(char c[], int n) override {
-    const uint64_t size = uint64_t(std::max(n, 0));
-    if (size <= kWindow && (at_ < begin_ || at_ + size > begin_ + window_.size())) fill();
-    if (at_ >= begin_ && at_ + size <= begin_ + window_.size())
-      std::memcpy(c, window_.data() + (at_ - begin_), size);
-    else
-      file_.read(at_, c, size);
-    at_ += size;
-    return at_ < file_.size();
-  }
-  uint64_t tellg() override { return at_; }
-  void seekg(uint64_t at) override { at_ = at; }
-
- private:
-  static constexpr size_t kWindow = 65536;
-
-  void fill() {
-    begin_ = std::min(at_, file_.size());
-    window_.resize(size_t(std::min<uint64_t>(kWindow, file_.size() - begin_)));
-    file_.read(begin_, window_.data(), window_.size());
-  }
-
-  const InputFile& file_;
-  std::vector<char> window_;
-  uint64_t begin_ = 0, at_ = 0;
-};
-
-int readInt(HeaderStream& stream) {
-  unsigned char b[4];
-  stream.read(reinterpret_cast<char*>(b), 4);
-  return int(uint32_t(b[0]) | uint32_t(b[1]) << 8 | uint32_t(b[2]) << 16 | uint32_t(b[3]) << 24);
-}
-
-std::string readName(HeaderStream& stream, const std::string& file) {
-  constexpr size_t kLongest = 255;
-  std::string name;
-  for (char c; stream.read(&c, 1), c != 0;) {
-    name += c;
-    if (name.size() > kLongest)
-      fail("{}: header: expected a name of at most {} letters, found a longer one", file, kLongest);
-  }
-  return name;
-}
-
-// Walks the attributes of one header and leaves the stream where it was; throws where a size does not fit into the
-// file. False for the empty header that ends a list.
-bool checkHeader(HeaderStream& stream, const InputFile& file) {
-  const uint64_t begin = stream.tellg();
-  bool any = false;
-  for (std::string name; !(name = readName(stream, file.path())).empty(); any = true) {
-    const std::string type = readName(stream, file.path());
-    const int size = readInt(stream);
-    const uint64_t at = stream.tellg();
-    if (size < 0 || uint64_t(size) > file.size() - at)
-      fail("{}: attribute {}: expected a size of at most {} bytes, found {}", file.path(), printable(name),
-           file.size() - at, uint32_t(size));
-    if (type == "stringvector") {
-      for (uint64_t used = 0; used < uint64_t(size);) {
-        const int length = readInt(stream);
-        used += 4;
-        if (length < 0 || used + uint64_t(length) > uint64_t(size))
-          fail("{}: attribute {}: expected strings within {} bytes, found one of {}", file.path(), printable(name),
-               size, uint32_t(length));
-        used += uint64_t(length);
-        stream.seekg(at + used);
-      }
-    }
-    stream.seekg(at + uint64_t(size));
-  }
-  stream.seekg(begin);
-  return any;
-}
 
 PixelType pixelType(Imf::PixelType type) {
   return type == Imf::UINT ? PixelType::Uint : type == Imf::HALF ? PixelType::Half : PixelType::Float;
@@ -236,6 +160,14 @@ void settleType(Imf::Header& header, int version, bool multiPart) {
     header.setType(Imf::isTiled(version) ? Imf::TILEDIMAGE : Imf::SCANLINEIMAGE);
 }
 
+// Standard attributes of another type than theirs say nothing, and could not be set where the header is written again.
+void dropMistyped(Imf::Header& header) {
+  for (const char* name : {"name", "view"})
+    if (!header.findTypedAttribute<Imf::StringAttribute>(name)) eraseAttribute(header, name);
+  for (const char* name : {"version", "chunkCount", "maxSamplesPerPixel"})
+    if (!header.findTypedAttribute<Imf::IntAttribute>(name)) eraseAttribute(header, name);
+}
+
 }  // namespace
 
 ExrFile::ExrFile(const std::string& path) : file_(path) {
@@ -261,6 +193,7 @@ void ExrFile::readHeaders() {
   while (checkHeader(stream, file_)) {
     Imf::Header header;
     header.readFrom(stream, version);
+    dropMistyped(header);
     settleType(header, version, multiPart_);
     if (!header.hasType()) fail("{}, part {}: attribute type: expected, found none", path, parts_.size());
     header.sanityCheck(Imf::isTiled(header.type()), multiPart_);

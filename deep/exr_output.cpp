@@ -57,7 +57,7 @@ ExrOutput::ExrOutput(const std::string& path, const Imf::Header& header, size_t 
 
 void ExrOutput::copyPart(const ExrFile& other, const PartInfo& part, std::vector<uint64_t>& table) {
   if (!Imf::isSupportedType(part.attributes.header().type()))
-    fail("{}: cannot copy a part of type {}", other.where(part), part.attributes.header().type());
+    fail("{}: cannot copy a part of type {}", other.where(part), printable(part.attributes.header().type()));
   uint64_t copied = 0;
   Bytes chunk;
   for (uint64_t& at : table) {

@@ -34,8 +34,9 @@ Channel* DeepImage::find(std::string_view name) {
 
 std::span<const float> DeepImage::get(std::string_view name) const {
   const Channel* channel = find(name);
-  if (!channel) fail("channel {}: expected in the image, found none", name);
-  if (channel->type == PixelType::Uint) fail("channel {}: expected FLOAT or HALF, found UINT", name);
+  if (!channel) fail("channel {}: expected in the image, found none", printable(std::string(name)));
+  if (channel->type == PixelType::Uint)
+    fail("channel {}: expected FLOAT or HALF, found UINT", printable(std::string(name)));
   return channel->values;
 }
 

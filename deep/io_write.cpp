@@ -65,7 +65,8 @@ Imf::Header makeHeader(const std::string& path, const DeepImage& layout, const B
   header.setVersion(1);
   header.channels() = Imf::ChannelList();
   for (const Channel& c : layout.channels) {
-    if (header.channels().findChannel(c.name)) fail("{}, channel {}: expected once, found twice", path, c.name);
+    if (header.channels().findChannel(c.name))
+      fail("{}, channel {}: expected once, found twice", path, printable(c.name));
     header.channels().insert(c.name, Imf::Channel(pixelType(c.type)));
   }
   return header;
@@ -119,9 +120,10 @@ struct Writer::Impl {
     for (const ChannelInfo& c : channels) {
       const Channel* channel = band.find(c.name);
       if (!channel || channel->type != c.type)
-        fail("{}, channel {}: expected in every band as in the first", output.path(), c.name);
+        fail("{}, channel {}: expected in every band as in the first", output.path(), printable(c.name));
       if (channel->size() < band.samples())
-        fail("{}, channel {}: expected {} values, found {}", output.path(), c.name, band.samples(), channel->size());
+        fail("{}, channel {}: expected {} values, found {}", output.path(), printable(c.name), band.samples(),
+             channel->size());
     }
   }
 

@@ -80,7 +80,8 @@ struct ExrWriter::Impl {
     if (dataWindow.empty() || layout.planes.empty()) fail("{}: expected an image to write, found an empty one", path);
     std::set<std::string> names;
     for (const Plane& plane : layout.planes)
-      if (!names.insert(plane.name).second) fail("{}, channel {}: expected once, found twice", path, plane.name);
+      if (!names.insert(plane.name).second)
+        fail("{}, channel {}: expected once, found twice", path, printable(plane.name));
     Imf::Header result(inclusive(layout.displayWindow), inclusive(dataWindow));
     std::map<std::string, std::string> kept = layout.attributes;
     std::erase_if(kept, [](const auto& attribute) { return describesEncoding(attribute.first); });

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -36,25 +35,35 @@ void parallelPipeline(size_t begin, size_t end, size_t most, const Fetch& fetch,
     for (size_t i = 0; i < made.size(); ++i) take(first + i, std::move(*made[i]));
   }
 #else
-  // oneTBB copies what goes between filters.
-  using Under = std::pair<size_t, std::shared_ptr<Fetched>>;
-  using Done = std::pair<size_t, std::shared_ptr<Made>>;
+  // Only indices go between filters: oneTBB copies what does, and does not destroy what is on the way when one throws. Those
+  // under way follow one another, as the last filter takes them in order.
+  struct Slot {
+    std::optional<Fetched> fetched;
+    std::optional<Made> made;
+  };
+  std::vector<Slot> slots(most);
+  const auto slot = [&](size_t i) -> Slot& { return slots[i % most]; };
   size_t next = begin;
-  const auto first = [&](tbb::flow_control& control) -> Under {
+  const auto first = [&](tbb::flow_control& control) -> size_t {
     if (next >= end) {
       control.stop();
-      return {};
+      return 0;
     }
-    auto fetched = std::make_shared<Fetched>(fetch(next));
-    return {next++, std::move(fetched)};
+    slot(next).fetched.emplace(fetch(next));
+    return next++;
   };
-  const auto second = [&](const Under& under) {
-    return Done(under.first, std::make_shared<Made>(make(under.first, std::move(*under.second))));
+  const auto second = [&](size_t i) {
+    slot(i).made.emplace(make(i, std::move(*slot(i).fetched)));
+    slot(i).fetched.reset();
+    return i;
   };
-  const auto third = [&](const Done& done) { take(done.first, std::move(*done.second)); };
-  tbb::parallel_pipeline(most, tbb::make_filter<void, Under>(tbb::filter_mode::serial_in_order, first) &
-                                   tbb::make_filter<Under, Done>(tbb::filter_mode::parallel, second) &
-                                   tbb::make_filter<Done, void>(tbb::filter_mode::serial_in_order, third));
+  const auto third = [&](size_t i) {
+    take(i, std::move(*slot(i).made));
+    slot(i).made.reset();
+  };
+  tbb::parallel_pipeline(most, tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order, first) &
+                                   tbb::make_filter<size_t, size_t>(tbb::filter_mode::parallel, second) &
+                                   tbb::make_filter<size_t, void>(tbb::filter_mode::serial_in_order, third));
 #endif
 }
 

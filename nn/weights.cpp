@@ -241,7 +241,8 @@ WeightFile readWeights(std::span<const std::byte> bytes, const std::string& name
 
 WeightFile readWeights(const std::string& path) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) fail("{}: expected a weight file, found a folder", path);
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+    fail("{}: expected a weight file, found something else", path);
   std::ifstream stream(path, std::ios::binary | std::ios::ate);
   if (!stream) fail("{}: cannot be read: {}", path, std::strerror(errno));
   const std::streamoff size = stream.tellg();

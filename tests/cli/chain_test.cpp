@@ -12,8 +12,10 @@
 namespace fathom::cli {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 using testing::Pair;
 using Words = std::vector<std::string>;
 
@@ -80,6 +82,19 @@ TEST(Chain, TextComesBackAsWords) {
   EXPECT_THROW(chainWords("a \"b"), Error);
 }
 
+TEST(Chain, ErrorsAreOneLineWhateverTheWordsHold) {
+  for (const Words& words : {Words{"a", "--x\ny"}, Words{"-x\ny"}, Words{"a", "-o", "x\ny"}, Words{"a\n#.#"},
+                             Words{"a", "--clip", "0", "1\n2"}, Words{"a", "--flatten", "z=x\ny"}}) {
+    EXPECT_THAT(errorOf(words), AllOf(HasSubstr("expected"), Not(HasSubstr("\n"))));
+  }
+  EXPECT_THAT(errorOf({"a", "--expression", "R = G;\n\tB = R"}), "");
+}
+
+TEST(Chain, WordsWithAnyKindOfSpaceComeBack) {
+  const Words words{"a\vb", "\f", "c d"};
+  EXPECT_EQ(chainWords(chainText(words)), words);
+}
+
 TEST(Chain, FilesStandForTheirWords) {
   const TemporaryFolder folder;
   std::ofstream(folder / "inner") << "--clip 0 1\n";
@@ -90,7 +105,29 @@ TEST(Chain, FilesStandForTheirWords) {
               ElementsAre("a", "--clip", "0", "1", "--flatten", "-o", "b.exr"));
   EXPECT_THROW(withChainFiles(Words{"--chain", folder / "endless"}), Error);
   EXPECT_THROW(withChainFiles(Words{"--chain", folder / "none"}), Error);
+  EXPECT_THROW(withChainFiles(Words{"--chain", folder.path()}), Error);
   EXPECT_THROW(withChainFiles(Words{"--chain"}), Error);
+}
+
+std::string errorOfFile(const std::string& path) {
+  try {
+    withChainFiles(Words{"--chain", path});
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+// Files that name files twice each would grow to more words than any memory holds.
+TEST(Chain, FilesDoNotMultiplyWithoutEnd) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "0") << "a.exr";
+  for (int i = 1; i < 15; ++i)
+    for (int twice = 0; twice < 12; ++twice)
+      std::ofstream(folder / std::to_string(i), std::ios::app) << "--chain " << folder / std::to_string(i - 1) << "\n";
+  EXPECT_EQ(errorOfFile(folder / "2"), "");
+  EXPECT_THAT(errorOfFile(folder / "14"), HasSubstr("expected chains of at most 1048576 bytes, found more"));
+  EXPECT_THAT(errorOfFile("/dev/zero"), HasSubstr("/dev/zero: expected chains of at most"));
 }
 
 }  // namespace

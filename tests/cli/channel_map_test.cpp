@@ -76,6 +76,11 @@ TEST(ChannelMap, SumsLeaveTheirTermsInTheFile) {
   EXPECT_EQ(image.get("R")[0], 10.0f);
 }
 
+TEST(ChannelMap, ErrorsAreOneLine) {
+  const auto of = [](const std::string& text) { return errorOf([&] { parseChannelMap("map", text); }); };
+  EXPECT_EQ(of("a\vb\r\n"), "channel map map, line 1: expected ours = theirs, found 'a?b?'");
+}
+
 TEST(ChannelMap, NamesMayBeExchanged) {
   // What a renderer calls diffuse is the albedo here: no line sees the result of another.
   const deep::DeepImage image = mapped("albedo = diffuse\ndiffuse = lighting", makeSample({{"diffuse.red", 1.0f},

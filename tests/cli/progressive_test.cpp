@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "cli/claim.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "flat/io.h"
@@ -82,6 +83,29 @@ TEST_F(Progressive, ErrorsAreLeftOutUnlessAskedFor) {
   writePasses(1);
   ASSERT_EQ(run("progressive in.0001.exr -o out.exr").status, 0);
   EXPECT_EQ(namesOf(read("out.exr")), (std::set<std::string>{"R", "G", "B", "A", "Z"}));
+}
+
+TEST_F(Progressive, APassThatAnotherProcessMakesIsLeftToIt) {
+  writePasses(3);
+  {
+    const auto claim = cli::Claim::take({folder_ / "out.0001.exr"});
+    const Ran ran = run("progressive in.####.exr -o out.####.exr");
+    EXPECT_EQ(ran.status, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("out.0001.exr: another process is at it"));
+    EXPECT_THAT(ran.err, Not(HasSubstr("expected more than")));
+    EXPECT_FALSE(exists("out.0001.exr"));
+    EXPECT_TRUE(exists("out.0003.exr"));
+    // Whoever asks for estimates works on it, and leaves the file to the other.
+    EXPECT_THAT(run("progressive in.0001.exr -o one.exr --report one.json").status, 0);
+    EXPECT_EQ(run("progressive in.####.exr -o out.####.exr --report all.json").status, 0);
+    EXPECT_FALSE(exists("out.0001.exr"));
+    const auto passes = nlohmann::json::parse(textOf(folder_ / "all.json"))["passes"];
+    const auto one = nlohmann::json::parse(textOf(folder_ / "one.json"))["passes"];
+    EXPECT_EQ(passes[0]["relMSE"], one[0]["relMSE"]);
+  }
+  EXPECT_EQ(run("progressive in.####.exr -o out.####.exr").status, 0);
+  EXPECT_TRUE(exists("out.0001.exr"));
+  EXPECT_FALSE(exists("out.0001.exr.claim"));
 }
 
 TEST_F(Progressive, ThreadsDoNotShow) {

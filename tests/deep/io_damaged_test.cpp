@@ -143,6 +143,26 @@ TEST_F(Damaged, AttributesThatPromiseTooMuch) {
   EXPECT_THAT(errorOf(with(4, uint32_t(0x802 | 0x8000))), HasSubstr("expected version 2 of EXR"));
 }
 
+// OpenEXR's library goes by what is in a value, and would take what follows for sizes that nobody has looked at.
+TEST_F(Damaged, AttributesWhoseSizeIsNotThatOfWhatIsInThem) {
+  make(Compression::Zips);
+  const size_t list = bytes_.find("chlist") + 7, first = bytes_.find('A', list), second = bytes_.find('Z', first);
+  ASSERT_EQ(second - first, 18u);
+  EXPECT_THAT(errorOf(with(second, char(0))), HasSubstr("attribute channels: expected channels that end with its"));
+  EXPECT_THAT(errorOf(with(list, int32_t(18 + 18 + 19))), HasSubstr("attribute channels: expected channels that end"));
+  const size_t size = bytes_.find("v2f") + 4;
+  EXPECT_THAT(errorOf(with(size, int32_t(4))),
+              HasSubstr("attribute screenWindowCenter: expected 8 bytes for its type v2f, found 4"));
+}
+
+TEST_F(Damaged, StandardAttributesOfAnotherTypeAreNoHindranceToWriting) {
+  make(Compression::Zips);
+  for (const std::string name : {"chunkCount", "maxSamplesPerPixel", "version"}) {
+    ASSERT_EQ(errorOf(with(bytes_.find(name) + name.size() + 1, 'j')), "") << name;
+    EXPECT_NO_THROW(write(folder_ / "b.exr", read(path_))) << name;
+  }
+}
+
 TEST_F(Damaged, CompressionsThatAreNotForDeepParts) {
   make(Compression::Zips);
   const size_t value = bytes_.find("compression", bytes_.find("compression") + 11) + 12 + 4;

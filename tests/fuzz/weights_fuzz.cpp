@@ -1,26 +1,24 @@
-// Any bytes as a weight file: tensors or an Error of one line, and a network from them or one too.
-//
-// The entry point is libFuzzer's; driver.cpp runs it where that is not at hand.
+// Any bytes as a weight file: tensors or an Error, and a network from them or one too.
 #include <cstdint>
-#include <cstdlib>
 #include <span>
-#include <string>
 
-#include "base/error.h"
 #include "nn/compositional.h"
+#include "nn/layers.h"
+#include "nn/mix.h"
+#include "tests/fuzz/expect.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace fathom;
-  try {
+  fuzz::mayFail([&] {
     const nn::WeightFile file = nn::readWeights(std::as_bytes(std::span(data, size)), "input");
     for (const auto& [name, tensor] : file.tensors) {
       size_t count = 1;
       for (const int64_t n : tensor.shape) count *= size_t(n);
-      if (count != tensor.values.size()) std::abort();
+      fuzz::expect(count == tensor.values.size(), "as many values as the shape has");
     }
-    const nn::CompositionalNet net(file);
-  } catch (const Error& e) {
-    if (std::string(e.what()).find('\n') != std::string::npos) std::abort();
-  }
+    fuzz::mayFail([&] { const nn::CompositionalNet net(file); });
+    fuzz::mayFail([&] { const nn::MixNet net(file); });
+    fuzz::mayFail([&] { const nn::LayersNet net(file); });
+  });
   return 0;
 }

@@ -8,7 +8,9 @@ the bytes of a run that nothing disturbed, or it is not there.
 """
 
 import argparse
+import contextlib
 import json
+import os
 import random
 import resource
 import shutil
@@ -25,6 +27,10 @@ COMP = ["comp", "--tidy", "--grade", "gain=2"]
 
 class Failure(Exception):
     pass
+
+
+class Skip(Exception):
+    """This machine or user cannot make the fault."""
 
 
 def expect(true, text):
@@ -163,10 +169,7 @@ def full_disk(lab, words):
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
     errors = lab.run(words, out, code=1, preexec_fn=limit)
-    lines = [line for line in errors.splitlines() if "cannot write" in line]
-    expect(len(lines) == len(lab.calm[words[0]]), f"expected a line for each frame, found: {errors[-500:]}")
-    left = [path.name for path in out.iterdir()]
-    expect(not left, f"left behind: {left}")
+    nothing_written(lab, words, out, errors)
 
 
 def no_folder(lab, words):
@@ -228,6 +231,104 @@ def starved(lab, words):
     expect(not left, f"left behind: {left}")
 
 
+def nothing_written(lab, words, out, errors):
+    """A line for each frame, and nothing left."""
+    lines = [line for line in errors.splitlines() if "cannot write" in line]
+    expect(len(lines) == len(lab.calm[words[0]]), f"expected a line for each frame, found: {errors[-500:]}")
+    left = [path.name for path in out.iterdir()]
+    expect(not left, f"left behind: {left}")
+
+
+@contextlib.contextmanager
+def read_only(folder):
+    """Permissions do not bind root, whom only an immutable folder stops."""
+    if os.geteuid() != 0:
+        folder.chmod(0o555)
+    elif subprocess.run(["chattr", "+i", folder], capture_output=True).returncode != 0:
+        raise Skip("chattr +i does not work here")
+    try:
+        yield
+    finally:
+        if os.geteuid() != 0:
+            folder.chmod(0o755)
+        else:
+            subprocess.run(["chattr", "-i", folder], check=True)
+
+
+@contextlib.contextmanager
+def small_disk(folder, size):
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True).returncode != 0:
+        raise Skip("mount does not work here")
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
+def read_only_folder(lab, words):
+    out = lab.fresh("read-only")
+    with read_only(out):
+        errors = lab.run(words, out, code=1)
+    expect("cannot write" in errors, errors[-500:])
+    left = [path.name for path in out.iterdir()]
+    expect(not left, f"left behind: {left}")
+
+
+def small_device(lab, words):
+    """A disk of its own, of half an output; a quota ends a run in the same place."""
+    out = lab.fresh("small")
+    with small_disk(out, min(len(data) for data in lab.calm[words[0]].values()) // 2):
+        nothing_written(lab, words, out, lab.run(words, out, code=1))
+
+
+def linked(lab, words):
+    """An output that is a symbolic link: the file behind it is written, the link stays."""
+    out = lab.fresh("linked")
+    elsewhere = out.parent / "elsewhere"
+    elsewhere.mkdir()
+    name = sorted(lab.calm[words[0]])[0]
+    (elsewhere / "image.exr").write_bytes(b"old")
+    (out / name).symlink_to("../elsewhere/image.exr")
+    lab.run(words, out, more=["--overwrite"])
+    lab.check(words, out)
+    expect((out / name).is_symlink(), f"{name}: the link is gone")
+    left = sorted(path.name for path in elsewhere.iterdir())
+    expect(left == ["image.exr"], f"left behind: {left}")
+
+
+def folder_removed(lab, words, chance):
+    """The folder of the outputs goes while they are made: a line for each frame that has no place, or nothing was left to do."""
+    out = lab.fresh("removed")
+    process = lab.start(words, out)
+    time.sleep(chance.uniform(0, 0.9) * lab.seconds[words[0]])
+    shutil.rmtree(out, ignore_errors=True)
+    _, errors = process.communicate(timeout=600)
+    expect(process.returncode in (0, 1), f"exit {process.returncode}: {errors[-500:]}")
+    expect(process.returncode == 0 or "cannot write" in errors, errors[-500:])
+    out.mkdir(exist_ok=True)
+    lab.run(words, out)
+    lab.check(words, out)
+
+
+def no_file(lab, words):
+    """A frame that is a folder or a named pipe, which nobody writes to: it fails, the others are made."""
+    for make in (Path.mkdir, os.mkfifo):
+        out = lab.fresh("no-file", copied=True)
+        victim = inputs_of(out)[1]
+        victim.unlink()
+        make(victim)
+        process = lab.start(words, out)
+        try:
+            _, errors = process.communicate(timeout=60 + 10 * lab.seconds[words[0]])
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise Failure(f"{make.__name__}: waits for ever") from None
+        expect(process.returncode == 1, f"expected exit 1, found {process.returncode}: {errors[-500:]}")
+        one_line(errors, victim.name)
+        names = sorted(lab.calm[words[0]])
+        lab.check(words, out, only=[name for i, name in enumerate(names) if i != 1])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=lambda path: str(Path(path).resolve()))
@@ -251,12 +352,19 @@ def main():
                 "vanishing input": lambda: vanishing(lab, words, chance),
                 "changed input": lambda: changed(lab, words),
                 "starved": lambda: starved(lab, words),
+                "read-only folder": lambda: read_only_folder(lab, words),
+                "small disk": lambda: small_device(lab, words),
+                "linked output": lambda: linked(lab, words),
+                "folder removed": lambda: folder_removed(lab, words, chance),
+                "input that is no file": lambda: no_file(lab, words),
             }
             for name, check in checks.items():
                 try:
                     check()
                     passed += 1
                     print(f"ok      {words[0]}: {name}", flush=True)
+                except Skip as why:
+                    print(f"skipped {words[0]}: {name}: {why}", flush=True)
                 except (Failure, OSError, subprocess.SubprocessError) as error:
                     failed += 1
                     print(f"FAILED  {words[0]}: {name}: {error}", flush=True)
