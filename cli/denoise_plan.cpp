@@ -16,8 +16,8 @@
 #include "deep/channels.h"
 #include "deep/error_estimate.h"
 #include "deep/flat_nl_means.h"
-#include "deep/mean_level.h"
 #include "deep/noise_response.h"
+#include "flat/level.h"
 
 namespace fathom::cli {
 

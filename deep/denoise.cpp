@@ -11,7 +11,6 @@
 #include "deep/filter_bank.h"
 #include "deep/flatten.h"
 #include "deep/gate.h"
-#include "deep/mean_level.h"
 #include "deep/noise_response.h"
 #include "deep/still.h"
 #include "flat/level.h"
@@ -145,6 +144,15 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   clock.lap("compose");
   progress.at(1);
   return image;
+}
+
+void addLevel(const DeepImage& rows, flat::LevelSum& level) {
+  const flat::Image flattened = flatten(rows);
+  const flat::Plane& alpha = flattened.get("A");
+  const std::array<const flat::Plane*, 3> rgb = {&flattened.get("R"), &flattened.get("G"), &flattened.get("B")};
+  for (size_t i = 0; i < alpha.values.size(); ++i)
+    for (const flat::Plane* plane : rgb)
+      if (alpha.values[i] > 0) level.add(double(plane->values[i]));
 }
 
 float meanLevel(const DeepImage& image) {

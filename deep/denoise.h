@@ -16,6 +16,7 @@
 
 namespace fathom::flat {
 struct NoiseResponse;
+class LevelSum;
 }
 
 namespace fathom::deep {
@@ -67,6 +68,9 @@ struct DenoisePlan {
 
 // The level (flat/level) of the flattened R, G and B of the pixels with alpha.
 float meanLevel(const DeepImage& image);
+
+// Adds these values of a frame that comes in bands of rows from the top: the same bits however it is cut.
+void addLevel(const DeepImage& rows, flat::LevelSum& level);
 
 // How many rows above and below a row decide its result: bands need that much around them.
 int denoiseHalo(const DenoisePlan& plan);
