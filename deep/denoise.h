@@ -17,7 +17,7 @@
 namespace fathom::flat {
 struct NoiseResponse;
 class LevelSum;
-}
+}  // namespace fathom::flat
 
 namespace fathom::deep {
 
