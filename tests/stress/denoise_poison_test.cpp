@@ -64,7 +64,7 @@ TEST(StressDenoise, PoisonStaysWithinReach) {
       for (int round = 0; round < 25 * stress::rounds(); ++round) {
         DeepImage image = clean.copy();
         const int at = int(draw.below(unsigned(length)));
-        std::string told = std::string(method.name) + " at " + std::to_string(at);
+        std::string told = fmt::format("{} at {}", method.name, at);
         for (unsigned times = 1 + draw.below(3); times > 0; --times) {
           const int x = lying ? at : int(draw.below(4)), y = lying ? int(draw.below(4)) : at;
           const size_t pixel = size_t(y) * size_t(clean.dataWindow.width()) + size_t(x);
@@ -76,7 +76,7 @@ TEST(StressDenoise, PoisonStaysWithinReach) {
           const std::string start = all ? name.substr(0, name.find('.')) : name;
           for (Channel& channel : image.channels)
             if (channel.type != PixelType::Uint && channel.name.starts_with(start)) channel.values[bin] = value;
-          told += ", " + start + (all ? "* " : " ") + std::to_string(value);
+          told += fmt::format(", {}{} {}", start, all ? "*" : "", value);
         }
         SCOPED_TRACE(told);
         const DeepImage out = run(image, plan);
