@@ -87,6 +87,7 @@ TEST(StressDenoise, FollowsTheExposure) {
 
 // Where the window lies does not matter: the same bits.
 TEST(StressDenoise, FollowsTheWindow) {
+  int frames = 0;
   for (const Method& method : kMethods)
     for (const auto& [dx, dy] : {std::pair{1, 0}, {-7, 5}, {100003, -100019}}) {
       const DeepImage image = renderFrame({.width = 37, .height = 23}).noisy;
@@ -95,9 +96,11 @@ TEST(StressDenoise, FollowsTheWindow) {
                             image.dataWindow.y1 + dy};
       DeepImage expected = run(image, method), found = run(shifted, method);
       found.dataWindow = image.dataWindow;
-      EXPECT_EQ(reference::difference(expected, found), "") << method.name << " " << dx << ", " << dy;
+      const std::string difference = reference::difference(expected, found);
+      EXPECT_EQ(difference, "") << method.name << " " << dx << ", " << dy;
+      frames += !difference.empty();
     }
-  record("deep denoiser", "windows elsewhere: bits that differ", 0, 1e-30);
+  record("deep denoiser", "windows elsewhere: frames with bits that differ", frames, 1);
 }
 
 // The pixels of a frame in another order: those of `from(x, y)`, bins in the order they had.
