@@ -162,8 +162,9 @@ TEST(StressDenoiseKernels, ColoursAndFeaturesAreReadAsTheirFormulasHaveIt) {
           const double w = all > 0 ? share * 2 * at(half + "samples", b) / all : 0;
           for (size_t c = 0; c < 3; ++c) {
             const std::string rgb(1, "RGB"[c]);
-            const double albedo = at(half + "albedo." + rgb, b) / alpha;
-            const double expected = w * at(half + "diffuse." + rgb, b) / alpha / (albedo + double(kAlbedoOffset));
+            const double albedo = at(fmt::format("{}albedo.{}", half, rgb), b) / alpha;
+            const double expected =
+                w * at(fmt::format("{}diffuse.{}", half, rgb), b) / alpha / (albedo + double(kAlbedoOffset));
             const float found = frame.data.components[0].data[8 * b + 4 * h + c];
             const float foundWeight = frame.data.components[0].data[8 * b + 4 * h + 3];
             if (w > 0 && foundWeight == 0) {  // only where something is beyond what counts as finite
@@ -171,7 +172,7 @@ TEST(StressDenoiseKernels, ColoursAndFeaturesAreReadAsTheirFormulasHaveIt) {
               for (const char* name : {"diffuse.", "specular.", ""})
                 for (const char* of : {"", "half0.", "half1."})
                   for (const char* channel : {"R", "G", "B"})
-                    most = std::max(most, std::fabs(at(std::string(of) + name + channel, b)) / alpha / 0.03);
+                    most = std::max(most, std::fabs(at(fmt::format("{}{}{}", of, name, channel), b)) / alpha / 0.03);
               ASSERT_GT(most, 0.9e15);
               continue;
             }

@@ -1,16 +1,11 @@
-// Laws of the deep denoiser with all its filters, gate and guide, on frames of any shape and of values at the ends of what
-// files hold.
+// Laws of the deep denoiser with all its filters, gate and guide: averages, exposure, windows, mirrors and parts.
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "deep/base_guide.h"
-#include "deep/denoise.h"
-#include "deep/flat_nl_means.h"
-#include "tests/reference/noisy_flat.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/rendered_frame.h"
-#include "tests/stress/extreme_noisy.h"
+#include "tests/stress/denoise_methods.h"
 #include "tests/stress/record.h"
 
 namespace fathom::deep {
@@ -18,96 +13,12 @@ namespace {
 
 using reference::renderFrame;
 using stress::extremeDeep;
-using stress::ExtremeParams;
+using stress::farthest;
+using stress::kMethods;
+using stress::Method;
+using stress::planOf;
 using stress::record;
-
-// A way to denoise bins.
-struct Method {
-  const char* name;
-  DenoiseParams params;
-  bool guided = false;
-};
-
-const std::vector<Method> kMethods{{"own", {}},
-                                   {"own, fast, no gate", {.quality = Quality::Fast, .gate = false}},
-                                   {"own, best", {.quality = Quality::Best}},
-                                   {"own, guided", {}, true},
-                                   {"paper", {.filter = FilterKind::Paper}},
-                                   {"rdfc", {.filter = FilterKind::Rdfc}}};
-
-DenoisePlan planOf(const DeepImage& image, const Method& method) {
-  DenoisePlan plan = stress::planFor(image, method.params);
-  plan.guided = method.guided;
-  return plan;
-}
-
-// With the plan of another frame, so that what is absolute stays.
-DeepImage run(const DeepImage& image, const DenoisePlan& plan) {
-  if (!plan.guided) return denoise(image.copy(), plan);
-  const GuideDenoisers denoisers{flatNlMeans(planFlattened(plan)), reference::boxDenoiser(), kOwnGuide};
-  const BaseGuide guide = makeGuide(guideInput(image, plan.inputs, true), denoisers, plan.level);
-  return denoise(image.copy(), plan, {}, nullptr, &guide);
-}
-
-DeepImage run(const DeepImage& image, const Method& method) {
-  return run(image, planOf(image, method));
-}
-
-bool isLight(const std::string& name) {
-  return stress::factorOf(name, 2) == 2 && !name.starts_with("half");
-}
-
-void expectFinite(const DeepImage& image) {
-  for (const Channel& channel : image.channels) {
-    if (!isLight(channel.name)) continue;
-    for (const float v : channel.values) ASSERT_TRUE(std::isfinite(v)) << channel.name << " " << v;
-  }
-}
-
-// The largest difference of light (not premultiplied, of bins that are seen) relative to its value, or to a hundredth of the
-// frame's level where that is more.
-double farthest(const DeepImage& a, const DeepImage& b, float level, double scale = 1) {
-  double worst = 0;
-  const auto alpha = a.get("A");
-  for (const Channel& channel : a.channels) {
-    if (!isLight(channel.name)) continue;
-    const auto x = a.get(channel.name), y = b.get(channel.name);
-    EXPECT_EQ(x.size(), y.size());
-    for (size_t i = 0; i < x.size(); ++i) {
-      if (!(alpha[i] > 1e-4f)) continue;
-      const double p = double(x[i]) / double(alpha[i]), q = double(y[i]) / scale / double(alpha[i]);
-      worst = std::max(worst, std::fabs(p - q) / std::max(std::fabs(p), 0.01 * double(level)));
-    }
-  }
-  return worst;
-}
-
-constexpr std::pair<int, int> kShapes[] = {{1, 1}, {1, 29}, {37, 1}, {2, 3}, {24, 17}};
-
-TEST(StressDenoise, AnyFrameGivesFiniteColoursAndKeepsTheRest) {
-  for (int round = 0; round < stress::rounds(); ++round)
-    for (const Method& method : kMethods)
-      for (const auto& [width, height] : kShapes)
-        for (const float largest : {6e4f, 9e14f})
-          for (const double empty : {0.1, 0.97, 1.0})
-            for (const bool all : {true, false}) {
-              SCOPED_TRACE(testing::Message() << method.name << ", " << width << "x" << height << " to " << largest
-                                              << ", empty " << empty << ", round " << round);
-              const DeepImage image = extremeDeep({.width = width,
-                                                   .height = height,
-                                                   .seed = unsigned(31 * round + width),
-                                                   .empty = empty,
-                                                   .largest = largest,
-                                                   .components = all,
-                                                   .features = all});
-              DeepImage before = image.copy(), after = run(image, method);
-              expectFinite(after);
-              for (const Channel& channel : image.channels)
-                if (isLight(channel.name) || !after.find(channel.name))
-                  before.erase(channel.name), after.erase(channel.name);
-              ASSERT_EQ(reference::difference(before, after), "");
-            }
-}
+using stress::run;
 
 // An average lies between what it is of. Without albedo and gate, bins are one.
 TEST(StressDenoise, ValuesStayBetweenThoseOfTheFrame) {
@@ -176,6 +87,7 @@ TEST(StressDenoise, FollowsTheExposure) {
 
 // Where the window lies does not matter: the same bits.
 TEST(StressDenoise, FollowsTheWindow) {
+  int frames = 0;
   for (const Method& method : kMethods)
     for (const auto& [dx, dy] : {std::pair{1, 0}, {-7, 5}, {100003, -100019}}) {
       const DeepImage image = renderFrame({.width = 37, .height = 23}).noisy;
@@ -184,9 +96,11 @@ TEST(StressDenoise, FollowsTheWindow) {
                             image.dataWindow.y1 + dy};
       DeepImage expected = run(image, method), found = run(shifted, method);
       found.dataWindow = image.dataWindow;
-      EXPECT_EQ(reference::difference(expected, found), "") << method.name << " " << dx << ", " << dy;
+      const std::string difference = reference::difference(expected, found);
+      EXPECT_EQ(difference, "") << method.name << " " << dx << ", " << dy;
+      frames += !difference.empty();
     }
-  record("deep denoiser", "windows elsewhere: bits that differ", 0, 1e-30);
+  record("deep denoiser", "windows elsewhere: frames with bits that differ", frames, 1);
 }
 
 // The pixels of a frame in another order: those of `from(x, y)`, bins in the order they had.
@@ -260,103 +174,6 @@ TEST(StressDenoise, APartIsDenoisedAsTheWhole) {
       EXPECT_LT(far, 1e-6) << method.name << (lying ? " lying" : " standing") << ", halo " << halo;
       record("deep denoiser", "parts with the filter's reach", far, 1e-6);
     }
-}
-
-// Random poison in random channels of up to three bins.
-TEST(StressDenoise, PoisonStaysWithinReach) {
-  constexpr float kPoisons[] = {stress::kNan, stress::kInfinity, -stress::kInfinity, -1, -1e10f, 1e20f, 9e14f, -9e14f,
-                                1e-42f};
-  const int length = 160;
-  for (const Method& method : kMethods)
-    for (const bool lying : {true, false}) {
-      const DeepImage clean =
-          renderFrame({.width = lying ? length : 4, .height = lying ? 4 : length, .volumes = true, .emission = true})
-              .noisy;
-      const DenoisePlan plan = planOf(clean, method);
-      const int halo = denoiseHalo(plan);
-      const DeepImage expected = run(clean, plan);
-      stress::Draw draw(7);
-      for (int round = 0; round < 25 * stress::rounds(); ++round) {
-        DeepImage image = clean.copy();
-        const int at = int(draw.below(unsigned(length)));
-        std::string told = std::string(method.name) + " at " + std::to_string(at);
-        for (unsigned times = 1 + draw.below(3); times > 0; --times) {
-          const int x = lying ? at : int(draw.below(4)), y = lying ? int(draw.below(4)) : at;
-          const size_t pixel = size_t(y) * size_t(clean.dataWindow.width()) + size_t(x);
-          if (image.count(pixel) == 0) continue;
-          const size_t bin = size_t(image.offsets[pixel]) + draw.below(unsigned(image.count(pixel)));
-          const float value = kPoisons[draw.below(unsigned(std::size(kPoisons)))];
-          const bool all = draw.below(4) == 0;  // of what begins alike
-          const std::string name = image.channels[draw.below(unsigned(image.channels.size()))].name;
-          const std::string start = all ? name.substr(0, name.find('.')) : name;
-          for (Channel& channel : image.channels)
-            if (channel.type != PixelType::Uint && channel.name.starts_with(start)) channel.values[bin] = value;
-          told += ", " + start + (all ? "* " : " ") + std::to_string(value);
-        }
-        SCOPED_TRACE(told);
-        const DeepImage out = run(image, plan);
-        expectFinite(out);
-        for (const Channel& channel : expected.channels) {
-          if (!isLight(channel.name)) continue;
-          const auto a = expected.get(channel.name), b = out.get(channel.name);
-          for (size_t p = 0; p < out.pixels(); ++p) {
-            const int place = int(lying ? p % size_t(length) : p / 4);
-            if (std::abs(place - at) <= halo) continue;
-            for (uint64_t i = out.offsets[p]; i < out.offsets[p + 1]; ++i)
-              ASSERT_TRUE(stress::sameBits(a[i], b[i])) << channel.name << " at " << place << ", halo " << halo;
-          }
-        }
-      }
-    }
-}
-
-// All that a bin can claim at once.
-TEST(StressDenoise, HugeCountsAndVariancesTogetherStayFinite) {
-  for (const Method& method : kMethods)
-    for (const float light : {0.5f, 9e14f}) {
-      DeepImage image = renderFrame({.width = 20, .height = 16}).noisy;
-      const DenoisePlan plan = planOf(image, method);
-      for (const size_t pixel : {150U, 151U, 210U}) {
-        const size_t bin = size_t(image.offsets[pixel]);
-        for (Channel& channel : image.channels) {
-          if (channel.name.starts_with("variance.") || channel.name.ends_with("samples")) channel.values[bin] = 9e14f;
-          if (stress::factorOf(channel.name, 2) == 2) channel.values[bin] = light;
-        }
-      }
-      SCOPED_TRACE(method.name);
-      expectFinite(run(image, plan));
-    }
-}
-
-// Halves of 0, 1 and very different counts, and pixels of 10,000 samples: nothing is lost and nothing made up.
-TEST(StressDenoise, HalvesOfAnyCountsKeepTheLight) {
-  constexpr double kBound = 1e-5;
-  double worst = 0;
-  for (const Method& method : kMethods)
-    for (const auto& [n, n0] :
-         {std::pair{2, 0}, {2, 1}, {2, 2}, {10000, 1}, {10000, 9999}, {10000, 0}, {10000, 5000}}) {
-      // Flattened halves are of half of a pixel's samples each: more or fewer are noise of the pixel's.
-      if (method.guided && 2 * n0 != n) continue;
-      DeepImage image = renderFrame({.width = 20, .height = 14, .empty = [](int, int) { return false; }}).noisy;
-      const auto all = image.get("samples"), first = image.get("half0.samples"), second = image.get("half1.samples");
-      for (size_t i = 0; i < all.size(); ++i) all[i] = float(n), first[i] = float(n0), second[i] = float(n - n0);
-      const auto alpha = image.get("A");
-      for (Channel& channel : image.channels) {
-        const std::string& name = channel.name;
-        const bool silent = (n0 == 0 && name.starts_with("half0.")) || (n0 == n && name.starts_with("half1."));
-        const bool whole = name.size() == 1 || name.size() == 7;  // R, half0.R
-        const bool albedo = name.find("albedo.") != std::string::npos && !name.starts_with("variance.");
-        if (stress::factorOf(name, 2) == 4) channel.values.fill(1e-2f);  // so that nothing is skipped
-        const float value = stress::factorOf(name, 2) == 2 ? whole ? 0.5f : 0.25f : 0.4f;
-        for (size_t i = 0; i < all.size() && (albedo || stress::factorOf(name, 2) == 2); ++i)
-          channel.values[i] = silent ? 0 : value * alpha[i];
-      }
-      const DenoisePlan plan = planOf(image, method);
-      const double far = farthest(image, run(image, plan), plan.level);
-      EXPECT_LT(far, kBound) << method.name << ", " << n0 << " of " << n;
-      worst = std::max(worst, far);
-    }
-  record("deep denoiser", "even light, halves of 0, 1 and very different counts, 10,000 samples", worst, kBound);
 }
 
 }  // namespace

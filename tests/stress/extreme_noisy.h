@@ -116,13 +116,14 @@ inline deep::DeepImage extremeDeep(const ExtremeParams& p = {}) {
     for (size_t l = 0; l < 2 && p.components; ++l) {
       const std::string layer = l ? "specular." : "diffuse.";
       for (const char* half : {"half0.", "half1."})
-        fill(half + layer + rgb, [&](const auto& b) {
+        fill(fmt::format("{}{}{}", half, layer, rgb), [&](const auto& b) {
           const double value = shade(b) * b.light[l] * (1 + b.wobble * draw.normal());
           const float count = *(half + 4) == '0' ? b.half0 : b.count - b.half0;
           return count > 0 ? std::clamp(value, -1e15, 1e15) : 0.0;
         });
       fill(layer + rgb, [&](const auto&) { return 0.0; });
-      const auto a = image.get("half0." + layer + rgb), b = image.get("half1." + layer + rgb);
+      const auto a = image.get(fmt::format("half0.{}{}", layer, rgb)),
+                 b = image.get(fmt::format("half1.{}{}", layer, rgb));
       const auto n = image.get("samples"), n0 = image.get("half0.samples"), mean = image.get(layer + rgb);
       for (size_t i = 0; i < bins.size(); ++i)
         mean[i] = n[i] > 0 ? float((double(n0[i]) * double(a[i]) + double(n[i] - n0[i]) * double(b[i])) / double(n[i]))
@@ -138,7 +139,7 @@ inline deep::DeepImage extremeDeep(const ExtremeParams& p = {}) {
         fill(half + rgb, [&](const auto& b) { return shade(b) * b.light[0] * (1 + b.wobble * draw.normal()); });
       }
       if (!p.features) continue;
-      fill(half + "albedo." + rgb, [&](const auto& b) {
+      fill(fmt::format("{}albedo.{}", half, rgb), [&](const auto& b) {
         return double(b.alpha) * (draw.below(4) ? draw.uniform() : double(draw.of({0, 1e-30f, 1e-5f, 1, 50})));
       });
     }

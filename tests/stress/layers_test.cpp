@@ -232,7 +232,7 @@ TEST(StressLayers, PoisonStaysWithinReach) {
     const float value =
         draw.of({stress::kNan, stress::kInfinity, -stress::kInfinity, -1, -1e10f, 1e20f, 9e14f, 1e-42f, 0});
     channel.values[image.offsets[pixel] + draw.below(unsigned(image.count(pixel)))] = value;
-    SCOPED_TRACE(channel.name + " " + std::to_string(value) + " at " + std::to_string(x));
+    SCOPED_TRACE(fmt::format("{} {} at {}", channel.name, value, x));
     const flat::Image found = flatOf(image);
     for (const char* c : {"R", "G", "B", "A"})
       for (size_t p = 0; p < image.pixels(); ++p) {

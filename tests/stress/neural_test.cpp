@@ -178,7 +178,7 @@ TEST(StressNeural, PoisonStaysWithinReach) {
     Plane& plane =
         draw.below(2) ? *image.find(kRgbNames[draw.below(3)]) : image.planes[draw.below(unsigned(image.planes.size()))];
     plane.values[i] = draw.of({stress::kNan, stress::kInfinity, -stress::kInfinity, -1, 1e20f, 9e14f, 1e-42f});
-    SCOPED_TRACE(plane.name + " " + std::to_string(plane.values[i]) + " at " + std::to_string(x));
+    SCOPED_TRACE(fmt::format("{} {} at {}", plane.name, plane.values[i], x));
     const bool light = plane.name.size() == 1 && plane.name != "A";  // or depth, of which the mean counts
     const Image found = denoiseNeural(small, params, image);
     for (const char* c : kRgbNames)
