@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
   } catch (const fathom::cli::Incomplete&) {
     return kFailed;
   } catch (const fathom::Cancelled&) {
-    fmt::print(stderr, "fathom: stopped\n");
+    fmt::print(stderr, "fathom: stopped; the same command again does what is left\n");
     return fathom::cli::kInterrupted;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "fathom: out of memory\n");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <stdexcept>
 
@@ -57,7 +58,7 @@ TEST(WorkerFailure, OfAPipelineIsThrownOnAndNothingMoreIsTaken) {
             0, 100, 4,
             [&](size_t i) {
               fails(0, i);
-              return thing;
+              return std::shared_ptr<int>(thing);
             },
             [&](size_t i, std::shared_ptr<int> held) {
               fails(1, i);

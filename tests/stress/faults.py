@@ -151,7 +151,7 @@ def interrupted(lab, words):
     _, errors = process.communicate(timeout=60)
     if process.returncode != 0:  # or it was done already
         expect(process.returncode == 130, f"expected exit 130, found {process.returncode}: {errors[-500:]}")
-        one_line(errors)
+        one_line(errors, "the same command again")
         left = [path.name for path in out.iterdir() if path.suffix != ".exr"]
         expect(not left, f"left behind: {left}")
     lab.check(words, out, whole=False)

@@ -20,6 +20,7 @@ from pathlib import Path
 WIDTH, HEIGHT = 48, 32
 WARM = 0.1  # of the frames come before memory is compared
 MAY_GROW = 2 << 20  # bytes, of the median over a tenth of the frames; allocators and thread pools settle in less
+MAY_OPEN = 4  # files at a moment, more than at another: a frame is read, one written, a claim taken at once
 MEMORY, MEMORY_BYTES = "4G", 4 << 30
 SAMPLES = 20
 
@@ -87,7 +88,7 @@ def many_frames(program, words, folder, count):
     files_then, files_now = (max(sample[2] for sample in part) for part in (early, late))
     told = f"{bytes_then / 1e6:.1f} to {bytes_now / 1e6:.1f} MB, {files_then} to {files_now} open files"
     expect(bytes_now <= bytes_then + MAY_GROW, f"memory grows: {told}")
-    expect(files_now <= files_then, f"open files grow: {told}")
+    expect(files_now <= files_then + MAY_OPEN, f"open files grow: {told}")
     return told
 
 

@@ -42,11 +42,12 @@ struct Frame {
 
   // The first `inFront` samples lie on the fence, which covers that share of the pixel.
   void fillPixel(deep::Channel* const* channels, size_t first, int x, int y) const {
+    const int strip = y / 64;
     const int inFront = x / 8 % 8 == 0 ? samples : x / 8 % 8 == 1 ? samples / 3 : 0;
     float depth = 0;
     for (int k = 0; k < samples; ++k) {
       const bool fence = k < inFront;
-      if (k == 0 || k == inFront) depth = fence ? 4.0f : 20.0f + float(y / 64) / 64;
+      if (k == 0 || k == inFront) depth = fence ? 4.0f : 20.0f + float(strip) / 64;
       const float alpha = 1.0f / float(samples - k);
       const float light = float(hashOf(uint32_t(x), uint32_t(y), uint32_t(k)) % 16) / 8;
       const float shade = fence ? 0.75f : 0.25f + 0.125f * float((x / 256 + y / 256) % 4);
