@@ -38,6 +38,22 @@ TEST(StressFlatten, ColourAndAlpha) {
   });
 }
 
+// Whose points at one depth are composited one after the other.
+TEST(StressFlatten, CameraSamples) {
+  Worst colour("flatten: colour, camera samples", kRounded);
+  forEachFrame([&](const Frame& frame) {
+    DeepImage image = frame.image.copy();
+    image.attributes.set("fathom:spp", 16);
+    const flat::Image flat = deep::flatten(image);
+    colour.touch(frame.name);
+    for (size_t p = 0; p < image.pixels(); ++p) {
+      const auto values = valuesOf(image, p, "G");
+      colour.put(frame.name, frame.seed, p, flat.get("G").values[p], exactPixel(image, p).light(values, kForever, true),
+                 magnitude(values));
+    }
+  });
+}
+
 TEST(StressFlatten, DepthsAndPlainChannels) {
   // The mean is a quotient of two sums in double, rounded to a float; so are plain means.
   Worst mean("flatten: Z", 0x1.01p-24), plain("flatten: coc", 0x1.01p-24);

@@ -63,6 +63,21 @@ TEST(StressTidy, TwiceIsOnce) {
   });
 }
 
+TEST(StressTidy, EqualDepthsKeepTheirOrder) {
+  const ExtremeParams params{.window = {0, 0, 3, 2}, .most = 500, .empty = 0, .coincident = true};
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const DeepImage image = extremeDeep(params, seed), sorted = deep::sortSamples(image.copy());
+    for (size_t p = 0; p < image.pixels(); ++p) {
+      const auto z = valuesOf(image, p, "Z"), zBack = valuesOf(image, p, "ZBack"), coc = valuesOf(image, p, "coc");
+      std::vector<size_t> order(z.size());
+      for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+      std::ranges::stable_sort(order, {}, [&](size_t i) { return std::pair(z[i], zBack[i]); });
+      for (size_t i = 0; i < order.size(); ++i)
+        EXPECT_EQ(valuesOf(sorted, p, "coc")[i], coc[order[i]]) << "pixel " << p;
+    }
+  }
+}
+
 TEST(StressMerge, ShowsBoth) {
   Worst light("merge: light", 0x1.01p-24);  // flattened, as that rounds
   forEachFrame([&](const Frame& frame) {
