@@ -49,10 +49,12 @@ Together together(const DeepImage& image, const DeepImage& other, size_t pixel) 
 
 TEST(StressTidy, ShowsWhatItIsMadeOf) {
   Worst light("tidy: light", kLight), passing("tidy: transmittance", kPassing);
+  Worst plain("tidy: coc", kLight);
   forEachFrame([&](const Frame& frame) {
     const DeepImage tidied = deep::tidy(frame.image.copy()).image;
     EXPECT_TRUE(deep::isTidy(tidied)) << frame.name << ", seed " << frame.seed;
     compareImages(frame, tidied, frame.image, light, passing);
+    comparePlain(frame, tidied, frame.image, plain);
   });
 }
 
