@@ -66,7 +66,7 @@ inline void comparePlain(const Frame& frame, const deep::DeepImage& found, const
   const flat::Image is = deep::flatten(found), shouldBe = deep::flatten(expected);
   plain.touch(frame.name);
   for (size_t p = 0; p < expected.pixels(); ++p)
-    if (shouldBe.get("A").values[p] > 0)
+    if (shouldBe.get("A").values[p] > 1e-30f)  // of denormal alphas a mean is not known
       plain.put(frame.name, frame.seed, p, is.get("coc").values[p], shouldBe.get("coc").values[p], 10);  // its range
 }
 
