@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "deep/channels.h"
+#include "deep/piece_depth.h"
 #include "deep/pixel_pieces.h"
 #include "deep/sample_depths.h"
 #include "flat/finite.h"
@@ -57,11 +58,16 @@ class Column {
       if (behind != planes_.begin() && behind != planes_.end()) over(cell, {piece.alpha, 1});
       return;
     }
-    const double depth = opticalDepth(piece.alpha), length = double(piece.range.zBack) - double(piece.range.z);
+    const size_t count = pieces_.order().size();
+    const double depth = opticalDepthOf(piece, from_.alpha.subspan(first, count), from_.depths.fronts(first, count),
+                                        from_.depths.backs(first, count));
+    // What is not opaque is cut as a volume, even where its alpha rounds to 1.
+    const double alpha = std::isinf(depth) ? 1 : std::min(piece.alpha, 1 - 0x1p-53);
+    const double length = double(piece.range.zBack) - double(piece.range.z);
     for (; cell < values_.size() && planes_[cell] < piece.range.zBack; ++cell) {
       const double inside =
           double(std::min(piece.range.zBack, planes_[cell + 1])) - double(std::max(piece.range.z, planes_[cell]));
-      if (inside > 0) over(cell, partOf({piece.alpha, depth, inside / length}));
+      if (inside > 0) over(cell, partOf({alpha, depth, inside / length}));
     }
   }
 

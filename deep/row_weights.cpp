@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "deep/channels.h"
+#include "deep/piece_depth.h"
 
 namespace fathom::deep {
 
@@ -38,19 +39,20 @@ struct RowCompositor::Pixel {
 struct RowCompositor::Ends {
   float front = kInfinity, back = kInfinity, passing = kInfinity;
 
-  void put(const Range& range, double pieceAlpha, double passedBefore, double passes) {
+  // `depth`: optical.
+  void put(const Range& range, double pieceAlpha, double depth, double passedBefore, double passes) {
     if (!(passedBefore * pieceAlpha > 0) || !std::isfinite(range.z)) return;
     front = std::min(front, range.z);
-    back = pieceAlpha == 1 ? range.z : range.zBack;
+    back = std::isinf(depth) ? range.z : range.zBack;
     const double passed = passedBefore * (1 - pieceAlpha);
-    if (passedBefore > passes && passed <= passes) passing = depthPassing(range, pieceAlpha, passes / passedBefore);
+    if (passedBefore > passes && passed <= passes) passing = depthPassing(range, depth, passes / passedBefore);
   }
 
  private:
   // Transmittance inside of a volume falls as (1 - alpha)^x, x from 0 to 1.
-  static float depthPassing(const Range& range, double pieceAlpha, double passes) {
-    if (range.isPoint() || pieceAlpha == 1) return range.z;
-    const double x = std::log(passes) / std::log1p(-pieceAlpha);
+  static float depthPassing(const Range& range, double depth, double passes) {
+    if (range.isPoint() || std::isinf(depth)) return range.z;
+    const double x = -std::log(passes) / depth;
     return std::min(float(range.z + x * (double(range.zBack) - double(range.z))), range.zBack);
   }
 };
@@ -94,7 +96,11 @@ void RowCompositor::compositeAny(size_t pixel, size_t begin, size_t end, Pixel& 
   pieces_.checkOverlaps(mergePoints_, image_.dataWindow, pixel);
   pieces_.visit(alpha_.subspan(begin, count), mergePoints_, [&](const Piece& piece) {
     const double front = sum.put(piece.range, piece.alpha);
-    if (findEnds_) ends.put(piece.range, piece.alpha, front, passes_);
+    if (findEnds_) {
+      const double depth = opticalDepthOf(piece, alpha_.subspan(begin, count), depths_.fronts(begin, count),
+                                          depths_.backs(begin, count));
+      ends.put(piece.range, piece.alpha, depth, front, passes_);
+    }
     for (const Share& share : piece.shares) {
       row_.premultiplied[first + share.sample] += front * share.weight;
       row_.seen[first + share.sample] += front * piece.alpha * share.part;
@@ -104,8 +110,10 @@ void RowCompositor::compositeAny(size_t pixel, size_t begin, size_t end, Pixel& 
 
 // The ends of a pixel that compositeTidy has composited.
 void RowCompositor::findEnds(size_t begin, size_t end, Ends& ends) const {
-  for (size_t i = begin; i < end; ++i)
-    ends.put(depths_[i], opacity(alpha_[i]), row_.premultiplied[i - rowBegin_], passes_);
+  for (size_t i = begin; i < end; ++i) {
+    const double alpha = opacity(alpha_[i]);
+    ends.put(depths_[i], alpha, opticalDepth(alpha), row_.premultiplied[i - rowBegin_], passes_);
+  }
 }
 
 const RowWeights& RowCompositor::composite(size_t firstPixel, size_t endPixel) {

@@ -4,11 +4,15 @@
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfIO.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace fathom {
 
 namespace {
+
+constexpr float kLargestHalf = 65504;
 
 // What OpenEXR writes a header to.
 class HeaderBytes : public Imf::OStream {
@@ -26,7 +30,8 @@ class HeaderBytes : public Imf::OStream {
 
 void putHalf(std::span<const float> values, uint8_t* to) {
   for (size_t i = 0; i < values.size(); ++i) {
-    const uint16_t bits = imath_float_to_half(values[i]);
+    const float value = std::isfinite(values[i]) ? std::clamp(values[i], -kLargestHalf, kLargestHalf) : values[i];
+    const uint16_t bits = imath_float_to_half(value);
     std::memcpy(to + 2 * i, &bits, sizeof(bits));
   }
 }

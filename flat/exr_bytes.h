@@ -23,7 +23,7 @@ void put(Bytes& to, const T& value) {
   std::memcpy(grow(to, sizeof(T)), &value, sizeof(T));
 }
 
-// HALF values, rounded to nearest as Imath does.
+// HALF values, rounded to nearest as Imath does; finite ones beyond what HALF holds become its largest, 65504.
 void putHalf(std::span<const float> values, uint8_t* to);
 
 void putHeader(Bytes& to, const Imf::Header& header, bool tiled);

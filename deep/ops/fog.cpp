@@ -10,6 +10,7 @@
 #include "deep/ops/fog_slabs.h"
 #include "deep/ops/merge.h"
 #include "deep/ops/sample_plan.h"
+#include "deep/piece_depth.h"
 #include "deep/pixel_pieces.h"
 #include "deep/tidy.h"
 
@@ -61,7 +62,10 @@ class PixelFog {
 
  private:
   void put(const Piece& piece) {
-    const double passing = fog_.passing(piece.range, piece.alpha);
+    const size_t count = pieces_.order().size();
+    const auto backs = zBack_.empty() ? zBack_ : zBack_.subspan(first_, count);
+    const double depth = opticalDepthOf(piece, alpha_.subspan(first_, count), z_.subspan(first_, count), backs);
+    const double passing = fog_.passing(piece.range, depth);
     light_->push_back(float(piece.alpha * (1 - passing)));
     if (piece.whole && passing == 1) {
       row_->keep(first_ + piece.largest);

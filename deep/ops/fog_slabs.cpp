@@ -127,9 +127,9 @@ double FogSlabs::passing(float z) const {
   return std::exp(-depthTo(double(z)));
 }
 
-double FogSlabs::passing(const Range& range, double alpha) const {
-  if (range.isPoint() || alpha == 1) return passing(range.z);
-  const double own = -std::log1p(-alpha), begin = range.z, end = range.zBack;
+double FogSlabs::passing(const Range& range, double own) const {
+  if (range.isPoint() || std::isinf(own)) return passing(range.z);
+  const double begin = range.z, end = range.zBack;
   double sum = 0, from = begin, inFront = depthTo(begin);
   auto border = std::upper_bound(borders_.begin(), borders_.end(), range.z);
   while (from < end) {

@@ -23,8 +23,8 @@ class FogSlabs {
 
   // Of the light of a point at z, what passes the fog in front of it.
   double passing(float z) const;
-  // Of a volume's light as it is seen without the fog, what passes.
-  double passing(const Range& range, double alpha) const;
+  // Of the light of a volume of that optical depth as it is seen without the fog, what passes.
+  double passing(const Range& range, double own) const;
 
  private:
   // A stretch of the ray on which density falls evenly, or rises, by a factor e every 1 / |rate|.

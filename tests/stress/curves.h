@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "deep/flatten.h"
 #include "tests/stress/exact_pixel.h"
 #include "tests/stress/frames.h"
 #include "tests/stress/worst.h"
@@ -57,6 +58,16 @@ inline void compareImages(const Frame& frame, const deep::DeepImage& found, cons
         [&](Real until, bool all) { return shouldBe.light(values, until, all); },
         [&](Real until) { return shouldBe.passing(until); }, light, passing);
   }
+}
+
+// That both flatten to the same channel coc, a mean by effective alpha.
+inline void comparePlain(const Frame& frame, const deep::DeepImage& found, const deep::DeepImage& expected,
+                         Worst& plain) {
+  const flat::Image is = deep::flatten(found), shouldBe = deep::flatten(expected);
+  plain.touch(frame.name);
+  for (size_t p = 0; p < expected.pixels(); ++p)
+    if (shouldBe.get("A").values[p] > 1e-30f)  // of denormal alphas a mean is not known
+      plain.put(frame.name, frame.seed, p, is.get("coc").values[p], shouldBe.get("coc").values[p], 10);  // its range
 }
 
 }  // namespace fathom::stress

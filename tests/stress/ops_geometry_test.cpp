@@ -130,11 +130,12 @@ TEST(StressKeymix, IsTheMeanOfBoth) {
 }
 
 TEST(StressLimit, ChangesNothingOfTheWhole) {
-  Worst light("limit: light", kMixed), alpha("limit: alpha", kMixed);
+  Worst light("limit: light", kMixed), alpha("limit: alpha", kMixed), plain("limit: coc", kMixed);
   forEachFrame([&](const Frame& frame) {
     light.touch(frame.name), alpha.touch(frame.name);
     for (const int most : {1, 2, 5}) {
       const DeepImage found = deep::limit(frame.image.copy(), most);
+      comparePlain(frame, found, frame.image, plain);
       for (size_t p = 0; p < found.pixels(); ++p) {
         EXPECT_LE(found.count(p), size_t(most));
         const ExactPixel exact = exactPixel(found, p), whole = exactPixel(frame.image, p);

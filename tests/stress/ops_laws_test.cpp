@@ -209,16 +209,18 @@ TEST(StressScale, OfAllLightChangesNothingElse) {
   });
 }
 
-// Two samples in one place, each as bright as can be.
+// Samples in one place, each as bright as can be: points, volumes, and light without alpha.
 TEST(StressLargest, SumsEndThere) {
-  const ExtremeParams params{.window = {0, 0, 7, 5}, .most = 6, .empty = 0, .volumes = true, .coincident = true};
-  for (const bool clear : {false, true}) {
+  const ExtremeParams params{.window = {0, 0, 7, 5}, .most = 6, .empty = 0};
+  for (const auto& [clear, back] :
+       {std::pair(false, 3.0f), std::pair(true, 3.0f), std::pair(false, 5.0f), std::pair(true, 5.0f)}) {
     DeepImage image = extremeDeep(params, 1), other = extremeDeep(params, 2);
-    for (DeepImage* one : {&image, &other})
-      for (const char* name : {"R", "G", "B"})
-        for (float& value : one->get(name)) value = 0.9e15f;
-    if (clear)
-      for (DeepImage* one : {&image, &other}) std::ranges::fill(one->get("A"), 0.0f);
+    for (DeepImage* one : {&image, &other}) {
+      for (const char* name : {"R", "G", "B"}) std::ranges::fill(one->get(name), 0.9e15f);
+      std::ranges::fill(one->get("Z"), 3.0f);
+      std::ranges::fill(one->get("ZBack"), back);
+      if (clear) std::ranges::fill(one->get("A"), 0.0f);
+    }
     for (const Operation& operation : operations()) {
       // These take away, or set other values.
       const auto others = {"expression", "clip", "hard holdout", "gamma", "recolour"};

@@ -49,10 +49,12 @@ Together together(const DeepImage& image, const DeepImage& other, size_t pixel) 
 
 TEST(StressTidy, ShowsWhatItIsMadeOf) {
   Worst light("tidy: light", kLight), passing("tidy: transmittance", kPassing);
+  Worst plain("tidy: coc", kLight);
   forEachFrame([&](const Frame& frame) {
     const DeepImage tidied = deep::tidy(frame.image.copy()).image;
     EXPECT_TRUE(deep::isTidy(tidied)) << frame.name << ", seed " << frame.seed;
     compareImages(frame, tidied, frame.image, light, passing);
+    comparePlain(frame, tidied, frame.image, plain);
   });
 }
 
@@ -63,6 +65,21 @@ TEST(StressTidy, TwiceIsOnce) {
   });
 }
 
+TEST(StressTidy, EqualDepthsKeepTheirOrder) {
+  const ExtremeParams params{.window = {0, 0, 3, 2}, .most = 500, .empty = 0, .coincident = true};
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const DeepImage image = extremeDeep(params, seed), sorted = deep::sortSamples(image.copy());
+    for (size_t p = 0; p < image.pixels(); ++p) {
+      const auto z = valuesOf(image, p, "Z"), zBack = valuesOf(image, p, "ZBack"), coc = valuesOf(image, p, "coc");
+      std::vector<size_t> order(z.size());
+      for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+      std::ranges::stable_sort(order, {}, [&](size_t i) { return std::pair(z[i], zBack[i]); });
+      for (size_t i = 0; i < order.size(); ++i)
+        EXPECT_EQ(valuesOf(sorted, p, "coc")[i], coc[order[i]]) << "pixel " << p;
+    }
+  }
+}
+
 TEST(StressMerge, ShowsBoth) {
   Worst light("merge: light", 0x1.01p-24);  // flattened, as that rounds
   forEachFrame([&](const Frame& frame) {
@@ -70,7 +87,7 @@ TEST(StressMerge, ShowsBoth) {
     both.push_back(frame.image.copy());
     both.push_back(another(frame));
     const DeepImage merged = deep::merge(both);
-    EXPECT_FALSE(deep::findUntidiness(deep::sortSamples(merged.copy())).unsorted);
+    EXPECT_FALSE(deep::findUntidiness(merged).unsorted);
     const flat::Image flat = deep::flatten(merged);
     const Box& window = frame.image.dataWindow;
     light.touch(frame.name);
