@@ -66,7 +66,7 @@ TEST(DamagedFilesTogether, InfoTellsOfEachAndGoesOn) {
   EXPECT_EQ(ran.status, 1);
   const auto answers = nlohmann::json::parse(ran.out);
   EXPECT_EQ(answers.size() + size_t(std::count(ran.err.begin(), ran.err.end(), '\n')), 92u);
-  EXPECT_GT(answers.size(), 20u);
+  EXPECT_GT(answers.size(), 15u);  // headers that contradict themselves are refused before they are read
 }
 
 }  // namespace
