@@ -8,10 +8,9 @@ a sample should lie in one layer rather than in all.
 
 import torch
 
-from loss import COARSE, LOGITS, mean_squares, relative_square, smape
+from loss import COARSE, LOGITS, SQUARED, mean_squares, relative_square, smape
 from model import half_size
 
-SQUARED = 2.0  # four times that of loss.py: results were 2 to 3 % too dark
 FEATURES = 3e-5  # as in loss.py; but at 1e-3 the features at half and quarter size died within 1500 steps
 ALPHA = 0.5  # weight of the mean square error of alpha
 APART = (1.0, 0.1)  # weight of the order of depths: at first, and in the end
