@@ -109,6 +109,9 @@ TEST(Still, NothingIsKnownToBeNothing) {
     lit.get("R")[image.offsets[pixel]] = odd;
     EXPECT_FALSE(prepare(std::move(lit), 4).activity.still[pixel]) << odd;
   }
+  // What one camera sample saw is not known.
+  image.get("samples")[image.offsets[pixel]] = 1;
+  EXPECT_FALSE(prepare(std::move(image), 4).activity.still[pixel]);
 }
 
 TEST(Still, TilesAskForComponentsThatHaveLight) {

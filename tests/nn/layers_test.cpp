@@ -205,7 +205,7 @@ TEST(LayersBand, SkipsWhatIsEmptyWithTheSameAnswer) {
   PlainSamples samples = randomSamples(64, 128, 3, 9);
   for (int y = 0; y < samples.height; ++y)
     for (int x = 0; x < samples.width; ++x)
-      if (y >= 20 || x >= 30) samples.at(y, x).clear();
+      if (y >= 20 || x >= 29) samples.at(y, x).clear();
   LayersBand band(net, 64, 128, {0, 64}, 2, 32);
   run(band, samples);
   EXPECT_EQ(band.filtered() + band.skipped(), 2U * 2 * 4);
