@@ -208,7 +208,8 @@ void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOpt
   if (guideChoice(request) == kLayersBase) {
     LayersOptions layers = request.layers;
     layers.output = LayersOutput::Bins;
-    plan.guide = layersGuide(planLayers(request.base, layers, plan.denoise.params.quality, request.memory), options);
+    plan.guide = layersGuide(planLayers(request.base, layers, plan.denoise.params.quality, request.memory), options,
+                             plan.cameraSamples);
     plan.denoise.guided = true;
     return;
   }

@@ -17,8 +17,10 @@ namespace fathom::cli {
 namespace {
 
 // Reads a row for the names that our channel map gives to channels; from then on, only what is needed.
-deep::LayerSource prepare(FrameSource& source, std::set<std::string>& notes, deep::Attributes& attributes) {
+deep::LayerSource prepare(FrameSource& source, bool clustered, std::set<std::string>& notes,
+                          deep::Attributes& attributes) {
   if (!source.deep()) fail("{}: expected a deep file for --method layers, found a flat one", source.path());
+  if (clustered) source.clusterFirst();
   const Box& window = source.part().dataWindow;
   std::set<std::string> told;
   const deep::DeepImage row = source.read(window.y0, std::min(window.y0 + 1, window.y1), told);
@@ -63,13 +65,16 @@ LayersPlan planLayers(const BaseOptions& base, const LayersOptions& options, dee
                       nameOf(options.output))};
 }
 
-LayersFrame::LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, const SourceOptions& options)
-    : plan_(plan), source_(inputs, options), layers_(prepare(source_, notes_, attributes_)) {
+LayersFrame::LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, const SourceOptions& options,
+                         bool clustered)
+    : plan_(plan), source_(inputs, options), layers_(prepare(source_, clustered, notes_, attributes_)) {
   const deep::LayerInputs has = layers_.inputs;
   const bool all = plan.output == LayersOutput::LayerBins;
-  source_.want([has, all](const std::string& name) {
-    return deep::layersRead(has, name) || (all && !deep::describesSamples(deep::roleOf(name, deep::PixelType::Float)));
-  });
+  if (!clustered)
+    source_.want([has, all](const std::string& name) {
+      return deep::layersRead(has, name) ||
+             (all && !deep::describesSamples(deep::roleOf(name, deep::PixelType::Float)));
+    });
   scale_ = deep::measureLayers(layers_, plan_.params);
 }
 
@@ -116,10 +121,10 @@ flat::Image LayersFrame::flattened(const Progress& progress) {
   return result;
 }
 
-GuidePlan layersGuide(const LayersPlan& plan, const SourceOptions& options) {
+GuidePlan layersGuide(const LayersPlan& plan, const SourceOptions& options, bool cameraSamples) {
   GuidePlan guide{{}, true, plan.settings};
-  guide.flattened = [plan, options](const FrameInputs& inputs, const Progress& progress) {
-    return LayersFrame(plan, inputs, options).flattened(progress);
+  guide.flattened = [plan, options, cameraSamples](const FrameInputs& inputs, const Progress& progress) {
+    return LayersFrame(plan, inputs, options, cameraSamples).flattened(progress);
   };
   guide.bytes = [plan](size_t pixels, size_t scratch) {
     const int side = int(std::sqrt(double(pixels))) + 1;

@@ -40,9 +40,9 @@ LayersPlan planLayers(const BaseOptions& base, const LayersOptions& options, dee
 // One frame on its way through the network.
 class LayersFrame {
  public:
-  // Opens it, and reads it once for what the whole frame decides. Throws Error where it is not deep, or without R, G, B, A
-  // or Z.
-  LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, const SourceOptions& options);
+  // Opens it, and reads it once for what the whole frame decides. `clustered`: it holds camera samples, which become bins
+  // first. Throws Error where it is not deep, or without R, G, B, A or Z.
+  LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, const SourceOptions& options, bool clustered = false);
 
   FrameSource& source() { return source_; }
   const std::set<std::string>& notes() const { return notes_; }
@@ -66,7 +66,8 @@ class LayersFrame {
   deep::LayerScale scale_;
 };
 
-// Frames' flat guides by the network.
-GuidePlan layersGuide(const LayersPlan& plan, const SourceOptions& options);
+// Frames' flat guides by the network; of `cameraSamples` from the bins that they are clustered into, as those are better
+// (docs/notes.md).
+GuidePlan layersGuide(const LayersPlan& plan, const SourceOptions& options, bool cameraSamples);
 
 }  // namespace fathom::cli
