@@ -11,6 +11,7 @@ namespace fathom::deep {
 
 namespace {
 
+constexpr float kLeastCount = 1e-3f;
 constexpr std::array<const char*, 3> kRgb{"R", "G", "B"};
 constexpr std::array<const char*, 3> kXyz{"X", "Y", "Z"};
 constexpr int kRowsAtOnce = 8;
@@ -35,6 +36,11 @@ float unpremultiply(float alpha) {
   return alpha > 0 ? 1 / std::min(alpha, 1.0f) : 0;
 }
 
+// Of camera samples; what is far from one is none.
+float countOf(float samples) {
+  return samples >= kLeastCount && isFinite(samples) ? samples : 0;
+}
+
 void fillCounts(const DeepImage& image, const DenoiseInputs& inputs, DenoiseData& data) {
   data.weight = effectiveAlpha(image);
   for (float& weight : data.weight)
@@ -42,10 +48,7 @@ void fillCounts(const DeepImage& image, const DenoiseInputs& inputs, DenoiseData
   data.count = Buffer<float>(data.bins());
   const std::span<const float> samples = inputs.counts ? image.get("samples") : std::span<const float>();
   const float spp = float(inputs.spp > 0 ? inputs.spp : kAssumedSpp);
-  forBins(data, [&](size_t b) {
-    const float n = samples.empty() ? data.weight[b] * spp : samples[b];
-    data.count[b] = n > 0 && isFinite(n) ? n : 0;
-  });
+  forBins(data, [&](size_t b) { data.count[b] = samples.empty() ? data.weight[b] * spp : countOf(samples[b]); });
 }
 
 // The same for the bins of pixels that are not skipped.
@@ -101,8 +104,8 @@ Feature readDepth(const DeepImage& image, const DenoiseInputs& inputs, const Buf
 // What each half says of its share of the bin: n_h / (spp / 2), from the counts where they are there.
 std::array<float, 2> halfWeights(float weight, std::span<const float> n0, std::span<const float> n1, size_t b) {
   if (n0.empty()) return {weight, weight};
-  const float a = std::max(n0[b], 0.0f), c = std::max(n1[b], 0.0f);
-  if (!(a + c > 0) || !isFinite(a + c)) return {0, 0};
+  const float a = countOf(n0[b]), c = countOf(n1[b]);
+  if (!(a + c > 0)) return {0, 0};
   return {weight * 2 * a / (a + c), weight * 2 * c / (a + c)};
 }
 

@@ -1,6 +1,9 @@
 #include "deep/still.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "base/parallel.h"
 
@@ -124,11 +127,14 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
     if (inputs.variance) return noiseOfFile(data, file, pixel).quiet(level);
     return data.halves || quietGuides(guides, x, y, level);
   };
-  const std::array<std::span<const float>, 3> rgb = {image.tryGet("R"), image.tryGet("G"), image.tryGet("B")};
+  std::vector<std::span<const float>> colours;
+  for (const char* prefix : {"", "diffuse.", "specular."})
+    for (const char* letter : {"R", "G", "B"})
+      if (const auto values = image.tryGet(prefix + std::string(letter)); !values.empty()) colours.push_back(values);
   const auto isBlank = [&](size_t pixel) {
-    if (rgb[0].empty() || rgb[1].empty() || rgb[2].empty()) return false;
     for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
-      if (data.count[b] > 0 || rgb[0][b] != 0 || rgb[1][b] != 0 || rgb[2][b] != 0) return false;
+      if (data.count[b] > 0 || std::ranges::any_of(colours, [&](const auto& values) { return values[b] != 0; }))
+        return false;
     return true;
   };
   Buffer<uint8_t> calm(pixels);

@@ -1,6 +1,7 @@
 #include "flat/error_map.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -80,8 +81,9 @@ std::vector<Padded> noiseOfMeans(const Noise& noise, const Box& window, const Bi
 }
 
 float shrunk(float sure, float spread, float variance, float noise, const Prior& prior, const ErrorMapParams& params) {
+  // Squares of variances that no normal float holds say nothing.
   const double p = prior.ratio * double(spread) + prior.rest * double(variance),
-               n = double(params.noiseFactor) * double(noise);
+               n = noise >= FLT_MIN ? double(params.noiseFactor) * double(noise) : 0;
   const double weight = p * p + n;
   const double error = weight > 0 ? (double(sure) * p * p + p * n) / weight : std::max(double(sure), 0.0);
   return float(std::max(error, double(params.leastSpread) * double(std::max(spread, 0.0f))));

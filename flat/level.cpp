@@ -8,6 +8,7 @@ namespace fathom::flat {
 namespace {
 
 constexpr double kFarAbove = 1000;
+constexpr double kDarkest = 1e-15;            // of which a hundred-thousandth of the square still is a normal float
 constexpr uint64_t kFewest = 3, kPart = 100;  // at most a hundredth of the values, or three
 
 }  // namespace
@@ -47,7 +48,7 @@ double LevelSum::mean(double farAbove) const {
 
 float LevelSum::result() const {
   const double level = mean(kFarAbove);
-  return level > 1e-20 && level < double(kLargest) ? float(level) : 0.5f;
+  return level > kDarkest && level < double(kLargest) ? float(level) : 0.5f;
 }
 
 }  // namespace fathom::flat

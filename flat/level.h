@@ -29,7 +29,7 @@ class LevelSum {
     ++binade.count;
   }
 
-  // The level; 0.5 where there is nothing, or less than 1e-20.
+  // The level; 0.5 where there is nothing, or less than 1e-15.
   float result() const;
   // The mean of what is below limit(farAbove); 0 where there is nothing.
   double mean(double farAbove) const;

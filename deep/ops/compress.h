@@ -20,8 +20,9 @@ struct CompressParams {
 // Samples that stay alone pass bit for bit, if their depths are usable; the others are first made tidy, as flattening
 // does it. All premultiplied channels are composited into the new samples, but R, G and B alone (0 where missing) are
 // held to the error; the id is that of the sample with the largest part of its alpha. Statistics and half buffers are
-// left out, always. Two things are outside of the error: overlapping volumes whose alpha together rounds to 1, which
-// are opaque from their front on, and what a file rounds where alpha or colours are HALF. Halo 0. Throws Error when A
+// left out, always. Three things are outside of the error: overlapping volumes whose alpha together rounds to 1, which
+// are opaque from their front on; light behind samples that let less than a ten-thousandth pass, which is off by what a
+// step of the FLOAT alpha of the one that they become is of that; and what a file rounds where alpha or colours are HALF. Halo 0. Throws Error when A
 // or Z is missing, when R, G or B is UINT, when the error is not above 0, and where volumes overlap too much (see
 // `tidy`).
 DeepImage compress(DeepImage image, const CompressParams& params);

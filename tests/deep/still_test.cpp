@@ -104,11 +104,12 @@ TEST(Still, NothingIsKnownToBeNothing) {
     for (size_t p = 0; p < image.pixels() && channel.name != "A" && channel.type != PixelType::Uint; ++p)
       for (size_t b = image.offsets[p]; b < image.offsets[p + 1] && p % 48 < 40; ++b) channel.values[b] = 0;
   EXPECT_TRUE(prepare(image.copy(), 4).activity.still[pixel]);
-  for (const float odd : {0.1f, std::numeric_limits<float>::quiet_NaN()}) {
-    DeepImage lit = image.copy();
-    lit.get("R")[image.offsets[pixel]] = odd;
-    EXPECT_FALSE(prepare(std::move(lit), 4).activity.still[pixel]) << odd;
-  }
+  for (const char* channel : {"R", "diffuse.G"})
+    for (const float odd : {0.1f, std::numeric_limits<float>::quiet_NaN()}) {
+      DeepImage lit = image.copy();
+      lit.get(channel)[image.offsets[pixel]] = odd;
+      EXPECT_FALSE(prepare(std::move(lit), 4).activity.still[pixel]) << channel << " " << odd;
+    }
   // What one camera sample saw is not known.
   image.get("samples")[image.offsets[pixel]] = 1;
   EXPECT_FALSE(prepare(std::move(image), 4).activity.still[pixel]);

