@@ -2,7 +2,7 @@
 //
 // Source: nn/layers.h; what it sees of samples is deep/layer_samples. A frame is read three times, in pieces of rows: once for
 // what the whole frame decides, and each band of it twice, so that what is held does not depend on how many samples a pixel
-// has. A scaled frame is denoised alike to 1e-4 over twelve powers of ten; skewed noise makes it up to 3 % darker (tests/stress).
+// has. A scaled frame is denoised alike to 1e-4 over twelve powers of ten; skewed noise makes it up to 4 % darker (tests/stress).
 #pragma once
 
 #include <cstdint>
