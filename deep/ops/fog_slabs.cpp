@@ -97,8 +97,7 @@ void FogSlabs::set(int x, int y) {
   wanted_.clear();
   const int slabs = even ? 1 : params_.height->slabs;
   for (int i = 1; i < slabs; ++i) wanted_.push_back(all * i / slabs);
-  for (double depth = kThickest; depth < std::min(all, kBlind + kThickest); depth += kThickest)
-    wanted_.push_back(depth);
+  for (int i = 1; i * kThickest < std::min(all, kBlind + kThickest); ++i) wanted_.push_back(i * kThickest);
   std::sort(wanted_.begin(), wanted_.end());
   borders_.push_back(float(params_.near));
   depths_.push_back(0);
