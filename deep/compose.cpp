@@ -97,7 +97,7 @@ Buffer<GateBin> compose(const DeepImage& image, const DenoiseData& data, const D
 
 Buffer<float> gatedColours(const DenoiseData& data, const Buffer<GateBin>& bins, const Buffer<flat::GateVerdict>& gates,
                            const Buffer<uint8_t>& still) {
-  Buffer<float> colours(data.bins() * 3);
+  Buffer<float> colours(data.bins() * 3, 0.0f);  // of pixels that nothing is made from, too
   const Buffer<uint8_t> unread = allWithin(still, data.width, data.height, kGateRadius);
   forActiveBins(data, unread, [&](int) {
     return [&](int, size_t b) {
