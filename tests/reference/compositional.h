@@ -68,19 +68,7 @@ inline PlainWeights randomCompositional(int w, uint32_t seed) {
                      {"inputs", "24"},
                      {"width", std::to_string(w)},
                      {"name", "random"}};
-  std::mt19937 generator(seed);
-  const auto tensor = [&](const std::string& name, std::vector<int64_t> shape, double scale) {
-    PlainTensor& made = result.tensors[name];
-    int64_t count = 1;
-    for (const int64_t n : shape) count *= n;
-    made.shape = std::move(shape);
-    for (int64_t i = 0; i < count; ++i)
-      made.values.push_back(float(scale * (2.0 * double(generator()) / 4294967296.0 - 1)));
-  };
-  const auto conv = [&](const std::string& name, int from, int to, int kernel, bool bias = true) {
-    tensor(name + ".weight", {to, from, kernel, kernel}, std::sqrt(4.0 / (from * kernel * kernel)));
-    if (bias) tensor(name + ".bias", {to}, 0.1);
-  };
+  RandomConvolutions conv(result, seed);
   const auto block = [&](const std::string& name, int n) {
     conv(name + ".0", n, n, 3);
     conv(name + ".1", n, n, 3);

@@ -42,6 +42,30 @@ inline Volume plus(Volume a, const Volume& b) {
   return a;
 }
 
+// Draws the weights of one convolution after another, so that values stay about as large.
+class RandomConvolutions {
+ public:
+  RandomConvolutions(PlainWeights& weights, uint32_t seed) : weights_(weights), generator_(seed) {}
+
+  void operator()(const std::string& name, int from, int to, int kernel, bool bias = true) {
+    draw(name + ".weight", {to, from, kernel, kernel}, std::sqrt(4.0 / (from * kernel * kernel)));
+    if (bias) draw(name + ".bias", {to}, 0.1);
+  }
+
+ private:
+  void draw(const std::string& name, std::vector<int64_t> shape, double scale) {
+    PlainTensor& made = weights_.tensors[name];
+    int64_t count = 1;
+    for (const int64_t n : shape) count *= n;
+    made.shape = std::move(shape);
+    for (int64_t i = 0; i < count; ++i)
+      made.values.push_back(float(scale * (2.0 * double(generator_()) / 4294967296.0 - 1)));
+  }
+
+  PlainWeights& weights_;
+  std::mt19937 generator_;
+};
+
 inline Volume convolve(const PlainWeights& weights, const std::string& name, const Volume& in, int stride = 1) {
   const PlainTensor& weight = weights.tensors.at(name + ".weight");
   const auto bias = weights.tensors.find(name + ".bias");
