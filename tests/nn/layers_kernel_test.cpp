@@ -60,7 +60,8 @@ TEST(LayerKernels, SplatEqualsItsTwin) {
 TEST(LayerKernels, SplatClampsLogitsAndIsFiniteWithoutWeights) {
   forSimdTargets([] {
     Volume logits(28, 3, 19), values(6, 3, 19);
-    for (size_t i = 0; i < logits.values.size(); ++i) logits.values[i] = i % 7 == 0 ? 1e30 : i % 5 == 0 ? -1e30 : 80;
+    for (size_t i = 0; i < logits.values.size(); ++i)
+      logits.values[i] = i % 7 == 0 ? 1e30 : i % 5 == 0 ? -1e30 : i % 3 == 0 ? 80 : 11.3;
     WidePlanes result, shares;
     const Buffer<float> grouped32 = grouped(logits, 16, 2, 0);
     splat(grouped32.data(), 16, wide(values), result, &shares);
