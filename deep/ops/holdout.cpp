@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/ops/sample_plan.h"
+#include "deep/piece_depth.h"
 #include "deep/pixel_pieces.h"
 #include "deep/sample_depths.h"
 #include "deep/tidy.h"
@@ -151,11 +152,14 @@ class PixelOpacity {
     const Run run = runAt(samples_.image, x, y);
     if (run.empty()) return {};
     const size_t count = run.end - run.next;
-    pieces_.set(samples_.depths.fronts(run.next, count), samples_.depths.backs(run.next, count));
+    z_ = samples_.depths.fronts(run.next, count);
+    zBack_ = samples_.depths.backs(run.next, count);
+    alpha_ = samples_.alpha.subspan(run.next, count);
+    pieces_.set(z_, zBack_);
     pieces_.checkOverlaps(true, samples_.image.dataWindow, samples_.image.dataWindow.index(x, y));
     passed_ = 1;
     reached_.reset();
-    pieces_.visit(samples_.alpha.subspan(run.next, count), true, [this](const Piece& piece) { put(piece); });
+    pieces_.visit(alpha_, true, [this](const Piece& piece) { put(piece); });
     return reached_;
   }
 
@@ -164,9 +168,9 @@ class PixelOpacity {
     const double behind = passed_ * (1 - piece.alpha);
     if (!reached_ && float(behind) <= float(least_)) {
       const Range& range = piece.range;
-      const double fraction = range.isPoint() || piece.alpha == 1
-                                  ? 0
-                                  : std::min(1.0, std::log(least_ / passed_) / std::log1p(-piece.alpha));
+      const double depth = opticalDepthOf(piece, alpha_, z_, zBack_);
+      const double fraction =
+          range.isPoint() || std::isinf(depth) ? 0 : std::min(1.0, std::log(passed_ / least_) / depth);
       reached_ = Reached{double(range.z) + fraction * (double(range.zBack) - double(range.z)), fraction > 0};
     }
     passed_ = behind;
@@ -175,6 +179,7 @@ class PixelOpacity {
   const Samples& samples_;
   double least_;  // transmittance
   PixelPieces pieces_;
+  std::span<const float> alpha_, z_, zBack_;  // of the pixel
   double passed_ = 1;
   std::optional<Reached> reached_;
 };

@@ -209,6 +209,24 @@ TEST(HardHoldout, AVolumeHidesFromTheDepthWhereItIsOpaqueEnough) {
   }
 }
 
+TEST(HardHoldout, ThickVolumesTogetherHideFromTheDepthWhereTheyAreOpaqueEnough) {
+  const float thick = 1 - 0x1p-24f;  // an optical depth of 24 log 2 each; the three together round to an alpha of 1
+  const DeepImage other = makeDeep({{{1, 37, thick, 0, 1}, {1, 37, thick, 0, 1}, {1, 37, thick, 0, 1}}}, 1);
+  for (const auto& [z, stays] : {std::pair{1.49f, true}, {1.51f, false}}) {
+    const DeepImage image = makeDeep({{{z, z, 1, 0.5f, 1}}}, 1);
+    EXPECT_EQ(hardHoldout(image, other, 0.5).samples() == 1, stays) << z;
+  }
+}
+
+TEST(HardHoldout, AnOpaqueVolumeHidesFromItsFront) {
+  const DeepImage other = makeDeep({{{2, 6, 1, 0, 1}}}, 1);
+  for (const double opaque : {0.5, 1.0})
+    for (const auto& [z, stays] : {std::pair{2.0f, true}, {2.01f, false}}) {
+      const DeepImage image = makeDeep({{{z, z, 1, 0.5f, 1}}}, 1);
+      EXPECT_EQ(hardHoldout(image, other, opaque).samples() == 1, stays) << z << ", " << opaque;
+    }
+}
+
 TEST(HardHoldout, KeepsThoseThatTheEquationOfTransferDoes) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     DeepImage image = randomImage(seed);
