@@ -95,11 +95,12 @@ double CompositionalNet::bytesPerPixel(int components) const {
   size_t arena = std::max(encoder_->plan(kSide, kSide)->layout().bytes, denoise_->plan(kSide, kSide)->layout().bytes);
   if (depth) arena = std::max(arena, decompose_->plan(kSide, kSide)->layout().bytes);
   const double features = double(bytesOf(element())) * width_;
-  const double planes = double(bytesOf(element())) * 32;
-  const double level = kColours * sizeof(float) + features;
+  const double planes = double(bytesOf(element())) * 32;  // where features of the first level come
+  const double colours = kColours * sizeof(float) * (1 + 2 * depth);
   const double logarithms = double(bytesOf(element())) * kColours;
   const double filter = sizeof(float) * (2 * kColours + 1) * (1 + 1.0 / 4 + 1.0 / 16);
-  return double(arena) / (kSide * kSide) + planes + (1 + 2 * depth) * level + logarithms + filter;
+  return double(arena) / (kSide * kSide) + std::max(planes, features) + 2 * depth * features + colours + logarithms +
+         filter;
 }
 
 // One window on its way through the network.
@@ -150,12 +151,13 @@ class CompositionalNet::Run {
     const Window& from = encoded_;
     const ElementSizes sizes = net_.encoder_->sizes();
     const size_t bytes = bytesOf(net_.encoder_->graph().info(net_.planes_), sizes, from.height, from.width);
-    packPlanes(frame_.planes.at(from.x, from.y), from.height, from.width, sizes.block, net_.element(),
-               grow(work_.planes, bytes));
+    Level& level = work_.levels[0][0];
+    std::byte* planes = grow(level.features, bytes);  // features come where the planes were
+    packPlanes(frame_.planes.at(from.x, from.y), from.height, from.width, sizes.block, net_.element(), planes);
     const auto plan = net_.encoder_->plan(from.height, from.width);
-    const std::byte* arena = runPlan(*plan, {work_.planes.data()});
-    cropFeatures(Plan::result(*plan, arena, net_.features_), from, windows_[0], work_.levels[0][0]);
-    cropColour(frame_.colour.at(windows_[0].x, windows_[0].y), windows_[0], work_.levels[0][0]);
+    const std::byte* arena = runPlan(*plan, {planes});
+    cropFeatures(Plan::result(*plan, arena, net_.features_), from, windows_[0], level);
+    cropColour(frame_.colour.at(windows_[0].x, windows_[0].y), windows_[0], level);
   }
 
   const std::byte* logarithms(const Level& level, const Window& window) {

@@ -62,7 +62,7 @@ class CompositionalNet {
       Buffer<std::byte> features;
     };
 
-    Buffer<std::byte> arena, planes, logColour;
+    Buffer<std::byte> arena, logColour;
     Level levels[3][2];
     Buffer<float> filtered[3], alpha[2];
     BorderedColour colour[3];
