@@ -9,6 +9,7 @@
 
 #include "base/parallel.h"
 #include "flat/finite.h"
+#include "flat/light.h"
 #include "flat/neural_planes.h"
 #include "flat/noise.h"
 #include "nn/tiles.h"
@@ -17,8 +18,8 @@ namespace fathom::flat {
 
 namespace {
 
-// Of a pixel: the planes, the colour and the network's result; ours, of three lights; and what is known of the noise.
-constexpr size_t kPixelBytes = (nn::kInputPlanes + 3 + 3 + 9) * sizeof(float) + 20;
+// Of a pixel: the planes, the colour and the network's result; ours, of three lights; a factor; and what is known of the noise.
+constexpr size_t kPixelBytes = (nn::kInputPlanes + 3 + 3 + 9 + 1) * sizeof(float) + 20;
 constexpr int kLargestTile = 512, kSmallestTile = 64;  // of nn/tiles
 
 // Without coefficients nothing tells what components are worth.
@@ -106,6 +107,8 @@ class LightRun {
     }
   }
 
+  void keepLight(Image& result) const { flat::keepLight(noisy_, settled_, result); }
+
  private:
   nn::BlockWorth worthOf(const nn::CompositionalInput& input, const nn::Window& block, bool open) const {
     nn::BlockWorth worth{.within = unsettledPart(settled_, noisy_.dataWindow, block)};
@@ -155,13 +158,14 @@ Image denoiseNeural(const nn::CompositionalNet& net, const NeuralParams& params,
   Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
   LightRun light(net, params, noisy, counts);
   const bool apart = hasLight(noisy, Light::Diffuse) && hasLight(noisy, Light::Specular);
-  if (!apart) {
+  if (apart) {
+    light.run(Light::Diffuse, {[&](double done) { progress.at(done / 2); }, progress.stop}, result);
+    light.run(Light::Specular, {[&](double done) { progress.at((1 + done) / 2); }, progress.stop}, result);
+    light.add(result);
+  } else {
     light.run(Light::Whole, progress, result);
-    return result;
   }
-  light.run(Light::Diffuse, {[&](double done) { progress.at(done / 2); }, progress.stop}, result);
-  light.run(Light::Specular, {[&](double done) { progress.at((1 + done) / 2); }, progress.stop}, result);
-  light.add(result);
+  light.keepLight(result);
   return result;
 }
 

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "flat/finite.h"
+#include "flat/light.h"
 #include "flat/mix_planes.h"
 
 namespace fathom::flat {
@@ -166,10 +167,20 @@ Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Cand
                     const ProgressiveParams& params, const Progress& progress) {
   nn::MixLogits logits;
   if (params.net) logits = params.net->run(mixSource(noisy, noise, candidates), progress);
-  if (candidates.size() == 1)
-    return mix(noisy, noise, candidates[0].denoised, candidates[0].map, candidates[0].k, logits.share);
-  const Candidate mean = merge(candidates, logits.weight);
-  return mix(noisy, noise, mean.denoised, mean.map, gate(noisy, noise, mean.denoised, params.gate), logits.share);
+  Candidate merged;
+  const bool several = candidates.size() > 1;
+  if (several) {
+    merged = merge(candidates, logits.weight);
+    merged.k = gate(noisy, noise, merged.denoised, params.gate);
+  }
+  const Candidate& mean = several ? merged : candidates[0];
+  Image result = mix(noisy, noise, mean.denoised, mean.map, mean.k, logits.share);
+  if (!params.net) return result;
+  // The network's weights favour the darker candidate: they are learned by relative errors.
+  std::vector<uint8_t> converged(result.dataWindow.area());
+  for (size_t i = 0; i < converged.size(); ++i) converged[i] = noise.pixel[i] == PixelNoise::Converged;
+  keepLight(noisy, converged, result);
+  return result;
 }
 
 Image denoiseProgressively(const Image& noisy, std::span<const Estimator> estimators, const ProgressiveParams& params,
