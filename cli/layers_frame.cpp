@@ -89,6 +89,9 @@ deep::DeepImage LayersFrame::denoise(const Band& band, const Progress& progress,
   const Stopwatch watch;
   deep::DeepImage result;
   deep::LayersCounts counts;
+  // A frame of one band has its light measured on the way.
+  if (!scale_.light && bands().size() > 1)
+    scale_.light = deep::measureLight(*plan_.net, plan_.params, layers_, scale_, {{}, progress.stop});
   deep::denoiseLayers(
       *plan_.net, plan_.params, layers_, scale_, band.y0, band.y1,
       [&](const deep::LayeredRows& rows) {

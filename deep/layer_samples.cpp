@@ -258,7 +258,7 @@ LayerScale LayerScaleSum::result() const {
     std::copy_n(light_.data() + c * dataWindow_.area(), dataWindow_.area(),
                 frame.add(std::string(1, "RGB"[c])).values.data());
   const double mean = weight_ > 0 ? depth_ / weight_ : 1;
-  return {flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f};
+  return {flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f, {}};
 }
 
 LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerScale& scale, int y) {
@@ -268,6 +268,7 @@ LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerS
   LayerRow row;
   row.emission = Buffer<float>(3 * width, 0.0f);
   row.emissionDepth = Buffer<float>(width, 0.0f);
+  row.nonFinite.resize(width);
   row.samples.first.push_back(0);
   std::vector<float> weights, alphas;
   const size_t first = size_t(y - rows.dataWindow.y0) * width;
@@ -285,7 +286,7 @@ LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerS
         });
     row.samples.first.push_back(uint32_t(row.places.size()));
     for (uint64_t s = rows.offsets[first + x]; s < rows.offsets[first + x + 1]; ++s)
-      row.nonFinite += alpha[s] > 0 && (!isFinite(z[s]) || !light.finite(s, std::min(alpha[s], 1.0f)));
+      row.nonFinite[x] += alpha[s] > 0 && (!isFinite(z[s]) || !light.finite(s, std::min(alpha[s], 1.0f)));
   }
   row.samples.values = Buffer<float>(nn::kSamplePlanes * row.places.size());
   RowMaker(rows, inputs, scale, light, row).make(weights, alphas);

@@ -15,18 +15,21 @@
 // Camera samples and bins are both taken so. A sample of alpha 0, or with a colour or depth that is not finite, has no say.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "deep/image.h"
 #include "deep/layer_inputs.h"
+#include "flat/light.h"
 #include "nn/layers.h"
 
 namespace fathom::deep {
 
 // What the whole frame decides.
 struct LayerScale {
-  float exposure = 1;  // see flat/neural_planes
-  float depth = 1;     // the mean by weight
+  float exposure = 1;                          // see flat/neural_planes
+  float depth = 1;                             // the mean by weight
+  std::optional<flat::LightCurve> light = {};  // what the denoised light is multiplied by, where that is known
 };
 
 // Made from the rows of a frame, in any pieces from the top.
@@ -50,7 +53,7 @@ struct LayerRow {
   // Of each pixel the light of samples without alpha, R G B, as it comes through what is before them; and the nearest depth
   // of any of these.
   Buffer<float> emission, emissionDepth;
-  uint64_t nonFinite = 0;  // samples with alpha whose colour or depth is not finite
+  std::vector<uint32_t> nonFinite;  // of each pixel the samples with alpha whose colour or depth is not finite
 };
 
 // Row y (of the data window's) of rows sorted front to back, which have the channels that `inputs` tells.

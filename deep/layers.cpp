@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -91,15 +92,23 @@ class BandRun {
         y1_(y1),
         band_(net, rounded(source.dataWindow.height()), rounded(source.dataWindow.width()),
               {y0 / kStep * kStep, rounded(y1)}, params.layers, tile),
-        result_{
-            band_, scale, source.dataWindow, source.displayWindow, source.dataWindow.y0 + y0, source.dataWindow.y0 + y1,
-            {},    {}} {
+        result_{band_,
+                scale,
+                source.dataWindow,
+                source.displayWindow,
+                source.dataWindow.y0 + y0,
+                source.dataWindow.y0 + y1,
+                {},
+                {},
+                {},
+                {}} {
     const size_t pixels = size_t(y1 - y0) * size_t(source.dataWindow.width());
     result_.emission = Buffer<float>(3 * pixels, 0.0f);
     result_.emissionDepth = Buffer<float>(pixels, 0.0f);
+    result_.render = Buffer<float>(pixels, 0.0f);
   }
 
-  const LayeredRows& run(const Progress& progress) {
+  LayeredRows& run(const Progress& progress) {
     forRows(band_.meanRows(), part(progress, 0, 0.3), [&](int y, const LayerRow& row) {
       band_.addMeans(y, row.samples);
       keep(row, y);
@@ -131,7 +140,17 @@ class BandRun {
     for (size_t c = 0; c < 3; ++c)
       std::copy_n(row.emission.data() + c * width, width, result_.emission.data() + c * plane + first);
     std::copy_n(row.emissionDepth.data(), width, result_.emissionDepth.data() + first);
-    nonFinite_ += row.nonFinite;
+    const nn::SampleRow& samples = row.samples;
+    const float *weight = samples.plane(nn::kWeightInput), *colour = samples.plane(nn::kExposedAt);
+    for (size_t x = 0; x < width; ++x) {
+      double sum = 0;
+      for (size_t i = samples.first[x]; i < samples.first[x + 1]; ++i)
+        for (size_t c = 0; c < 3; ++c) sum += double(weight[i]) * double(colour[c * samples.count() + i]);
+      sum /= double(scale_.exposure);
+      for (size_t c = 0; c < 3; ++c) sum += double(row.emission[c * width + x]);
+      result_.render[first + x] = row.nonFinite[x] ? std::numeric_limits<float>::quiet_NaN() : float(sum / 3);
+      nonFinite_ += row.nonFinite[x];
+    }
   }
 
   const LayerSource& source_;
@@ -164,9 +183,25 @@ LayerScale measureLayers(const LayerSource& source, const LayersParams& params, 
   return sum.result();
 }
 
-void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
-                   const LayerScale& scale, int y0, int y1, const std::function<void(const LayeredRows& rows)>& take,
-                   const Progress& progress, LayersCounts* counts) {
+float LayeredRows::brightness(int y, int x) const {
+  double passed = 1, sum = 0;
+  for (int l = 0; l < band.layers(); ++l) {
+    const auto value = [&](size_t plane) { return double(band.row(l, plane, y - frame.y0)[x]); };
+    sum += passed * (value(0) + value(1) + value(2));
+    passed *= 1 - value(3);
+  }
+  sum /= double(scale.exposure);
+  const size_t plane = render.size(), i = size_t(y - y0) * size_t(frame.width()) + size_t(x);
+  for (size_t c = 0; c < 3; ++c) sum += double(emission[c * plane + i]);
+  return float(sum / 3);
+}
+
+namespace {
+
+// Of a frame or its part, in bands from the top.
+template <class Take>
+void forBands(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source, const LayerScale& scale,
+              int y0, int y1, const Progress& progress, LayersCounts* counts, const Take& take) {
   const Box& window = source.dataWindow;
   const size_t least = leastLayersBytes(net, params.layers, window);
   if (params.memory && params.memory < least)
@@ -179,7 +214,7 @@ void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const L
     const int end = std::min(last, y / kStep * kStep + cut.rows);
     arena.execute([&] {
       BandRun run(net, params, cut.tile, source, scale, y, end);
-      const LayeredRows& rows =
+      LayeredRows& rows =
           run.run(part(progress, double(y - first) / (last - first), double(end - first) / (last - first)));
       if (counts) {
         counts->filtered += rows.band.filtered();
@@ -191,6 +226,63 @@ void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const L
     y = end;
   }
   progress.at(1);
+}
+
+flat::LightCurve emptyCurve(const LayerScale& scale) {
+  return flat::LightCurve(1 / scale.exposure);
+}
+
+void addLight(const LayeredRows& rows, flat::LightCurve& curve) {
+  const int width = rows.frame.width();
+  for (int y = rows.y0; y < rows.y1; ++y)
+    for (int x = 0; x < width; ++x)
+      curve.add(rows.brightness(y, x), rows.render[size_t(y - rows.y0) * size_t(width) + size_t(x)]);
+}
+
+void findFactors(const flat::LightCurve& curve, LayeredRows& rows) {
+  if (!curve.changes()) return;
+  const int width = rows.frame.width();
+  rows.factors = Buffer<float>(rows.render.size());
+  parallelFor(rows.y0, rows.y1, [&](int y) {
+    for (int x = 0; x < width; ++x)
+      rows.factors[size_t(y - rows.y0) * size_t(width) + size_t(x)] = curve.factor(rows.brightness(y, x));
+  });
+}
+
+}  // namespace
+
+flat::LightCurve measureLight(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
+                              const LayerScale& scale, const Progress& progress) {
+  flat::LightCurve curve = emptyCurve(scale);
+  const Box& window = source.dataWindow;
+  forBands(net, params, source, scale, window.y0, window.y1, progress, nullptr,
+           [&](const LayeredRows& rows) { addLight(rows, curve); });
+  curve.fit();
+  return curve;
+}
+
+void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
+                   const LayerScale& scale, int y0, int y1, const std::function<void(const LayeredRows& rows)>& take,
+                   const Progress& progress, LayersCounts* counts) {
+  const Box& window = source.dataWindow;
+  const bool measures = !scale.light && y0 == window.y0 && y1 == window.y1;
+  if (measures && layersBands(net, params, window).size() > 1) {
+    LayerScale told = scale;
+    told.light = measureLight(net, params, source, scale, part(progress, 0, 0.5));
+    denoiseLayers(net, params, source, told, y0, y1, take, part(progress, 0.5, 1), counts);
+    return;
+  }
+  forBands(net, params, source, scale, y0, y1, progress, counts, [&](LayeredRows& rows) {
+    if (measures) {
+      flat::LightCurve curve = emptyCurve(scale);
+      addLight(rows, curve);
+      curve.fit();
+      findFactors(curve, rows);
+    } else if (scale.light) {
+      findFactors(*scale.light, rows);
+    }
+    take(rows);
+  });
 }
 
 std::vector<std::pair<int, int>> layersBands(const nn::LayersNet& net, const LayersParams& params, const Box& window) {

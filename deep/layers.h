@@ -2,7 +2,7 @@
 //
 // Source: nn/layers.h; what it sees of samples is deep/layer_samples. A frame is read three times, in pieces of rows: once for
 // what the whole frame decides, and each band of it twice, so that what is held does not depend on how many samples a pixel
-// has. A scaled frame is denoised alike to 1e-4 over twelve powers of ten; skewed noise makes it up to 4 % darker (tests/stress).
+// has. A scaled frame is denoised alike to 1e-4 over twelve powers of ten; what light it lacks comes back (flat/light).
 #pragma once
 
 #include <cstdint>
@@ -45,12 +45,22 @@ struct LayeredRows {
   int y0, y1;                   // these rows of it
   Buffer<float> emission;       // [3][rows][width]: the light of samples without alpha
   Buffer<float> emissionDepth;  // [rows][width]
+  Buffer<float> render;         // [rows][width]: the brightness of the noisy frame; NaN where samples are lost
+  Buffer<float> factors;        // [rows][width]: what all light is to be multiplied by; empty: nothing
+
+  // The brightness of all layers one over the other, with that of samples without alpha, before factors.
+  float brightness(int y, int x) const;
 };
 
 LayerScale measureLayers(const LayerSource& source, const LayersParams& params, const Progress& progress = {});
 
-// Rows [y0, y1) of the data window in bands, from the top; `take` gets each when it is done. The same bits for any number of
-// threads; for other bands the same to within rounding. Throws Error where `memory` does not do, and Cancelled.
+// For LayerScale::light: denoises the whole frame to see what light it lacks (flat/light).
+flat::LightCurve measureLight(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
+                              const LayerScale& scale, const Progress& progress = {});
+
+// Rows [y0, y1) of the data window in bands, from the top; `take` gets each when it is done. Where the scale knows no light, a whole
+// frame has it measured, which takes as long again unless it is one band, and rows stay as the network makes them. The same bits for any
+// number of threads; for other bands the same to within rounding. Throws Error where `memory` does not do, and Cancelled.
 void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
                    const LayerScale& scale, int y0, int y1, const std::function<void(const LayeredRows& rows)>& take,
                    const Progress& progress = {}, LayersCounts* counts = nullptr);

@@ -29,13 +29,14 @@ class Pixels {
   // y: of the data window; x counts from its left.
   LayerPixel at(int layer, int y, int x) const {
     const auto value = [&](size_t plane) { return rows_.band.row(layer, plane, y - rows_.frame.y0)[x]; };
-    return {{value(0) * scale_, value(1) * scale_, value(2) * scale_}, value(3), value(4)};
+    const float scale = scale_ * factor(y, x);
+    return {{value(0) * scale, value(1) * scale, value(2) * scale}, value(3), value(4)};
   }
 
   float emission(size_t c, int y, int x) const {
-    return rows_.emission[(c * size_t(rows_.y1 - rows_.y0) + size_t(y - rows_.y0)) * width() + size_t(x)];
+    return factor(y, x) * rows_.emission[c * rows_.render.size() + place(y, x)];
   }
-  float emissionDepth(int y, int x) const { return rows_.emissionDepth[size_t(y - rows_.y0) * width() + size_t(x)]; }
+  float emissionDepth(int y, int x) const { return rows_.emissionDepth[place(y, x)]; }
 
   // All layers, one over the other: colour and alpha.
   std::array<float, 4> composited(int y, int x) const {
@@ -51,7 +52,8 @@ class Pixels {
   }
 
  private:
-  size_t width() const { return size_t(rows_.frame.width()); }
+  size_t place(int y, int x) const { return size_t(y - rows_.y0) * size_t(rows_.frame.width()) + size_t(x); }
+  float factor(int y, int x) const { return rows_.factors.empty() ? 1 : rows_.factors[place(y, x)]; }
 
   const LayeredRows& rows_;
   const float scale_;

@@ -17,9 +17,45 @@
 
 namespace fathom::flat {
 
-// What to multiply each pixel's colours by, 0.75 to 1.25; empty where none is to be changed. Channels are R, G and B of as many pixels.
-// Pixels in `settled` (not 0), and those whose denoised light is not above 0, are not looked at, and keep 1; those whose render is
-// not finite do not count. Scaled frames are treated alike.
+// Takes the brightness, a mean of R, G and B, of one pixel after the other.
+class LightCurve {
+ public:
+  // `level`: about the mean brightness of the frame; scaled along with it, the factors stay.
+  explicit LightCurve(float level) : level_(level) {}
+
+  // Has no effect where the denoised light is not above 0, or the render not finite or absurd.
+  void add(float denoised, float render);
+  // After the last one.
+  void fit();
+  // Whether any factor is not 1.
+  bool changes() const { return changes_; }
+  // What to multiply a pixel's colours by, 0.75 to 1.25; 1 where there is no light.
+  float factor(float denoised) const;
+
+ private:
+  static constexpr int kOctaves = 20;  // below and above the level; what is beyond counts as there
+
+  // Denoised and rendered light, and the variance of their difference.
+  struct Sums {
+    double pixels = 0, denoised = 0, render = 0, variance = 0;
+
+    void add(double d, double n, double weight);
+    double lacking() const;
+  };
+  struct Place {
+    int octave = 0;
+    float above = 0;  // the part that belongs to the next one
+  };
+  Place placeOf(float denoised) const;
+
+  float level_;
+  bool changes_ = false;
+  std::array<Sums, 2 * kOctaves + 2> sums_{};
+  std::array<float, 2 * kOctaves + 2> factors_{};
+};
+
+// The same of R, G and B of as many pixels: a factor for each, empty where none is to be changed. Pixels in `settled` (not 0) are
+// not looked at, and keep 1.
 Buffer<float> lightFactors(const std::array<std::span<const float>, 3>& render, std::span<const uint8_t> settled,
                            const std::array<std::span<const float>, 3>& denoised);
 

@@ -116,6 +116,68 @@ TEST(Layers, ABrighterFrameIsDenoisedAlike) {
   expectNear(result, expected, 1e-4f);
 }
 
+// What is denoised with a curve of light that is given.
+Results runWith(const DeepImage& image, const flat::LightCurve& light) {
+  static const nn::LayersNet net = randomNet();
+  Results results;
+  const LayerSource source = layerSource(image);
+  LayerScale scale = measureLayers(source, {});
+  scale.light = light;
+  denoiseLayers(net, {}, source, scale, image.dataWindow.y0, image.dataWindow.y1, [&](const LayeredRows& rows) {
+    results.flat = flattenedLayers(rows);
+    results.layers = layersImage(rows, image.attributes);
+    results.bins = inLayerColours(image.copy(), rows, source.inputs);
+  });
+  return results;
+}
+
+TEST(Layers, AllLightIsMultipliedByTheCurve) {
+  const DeepImage image = reference::makeNoisyFrame(37, 30, 1);
+  flat::LightCurve none(1), brighter(1);
+  for (float d = 1e-5f; d < 1e3f; d *= 1.01f)
+    for (int i = 0; i < 10; ++i) none.add(d, d), brighter.add(d, 1.1f * d);
+  none.fit();
+  brighter.fit();
+  const float factor = brighter.factor(0.3f);
+  ASSERT_NEAR(factor, 1.095f, 0.003f);
+  const Results expected = runWith(image, none), found = runWith(image, brighter);
+  for (const char* name : {"R", "G", "B", "A"}) {
+    const float f = name[0] == 'A' ? 1 : factor;
+    for (size_t i = 0; i < image.pixels(); ++i) {
+      const float was = expected.flat.get(name).values[i];
+      ASSERT_NEAR(found.flat.get(name).values[i], f * was, 1e-3f * was) << name << " " << i;
+    }
+    for (const auto& [a, b] : {std::pair{&expected.layers, &found.layers}, {&expected.bins, &found.bins}}) {
+      const std::span<const float> was = a->get(name), is = b->get(name);
+      ASSERT_EQ(was.size(), is.size());
+      for (size_t i = 0; i < was.size(); ++i) ASSERT_NEAR(is[i], f * was[i], 1e-3f * was[i]) << name << " " << i;
+    }
+  }
+}
+
+TEST(Layers, RowsKnowTheBrightnessOfTheRenderAndOfTheResult) {
+  static const nn::LayersNet net = randomNet();
+  const DeepImage image = reference::makeNoisyFrame(37, 30, 1);
+  const flat::Image noisy = flatten(image);
+  const LayerSource source = layerSource(image);
+  LayerScale scale = measureLayers(source, {});
+  scale.light = flat::LightCurve(1);
+  scale.light->fit();
+  const Box& window = image.dataWindow;
+  denoiseLayers(net, {}, source, scale, window.y0, window.y1, [&](const LayeredRows& rows) {
+    const flat::Image result = flattenedLayers(rows);
+    for (int y = window.y0; y < window.y1; ++y)
+      for (int x = 0; x < window.width(); ++x) {
+        const size_t i = size_t(y - window.y0) * size_t(window.width()) + size_t(x);
+        const auto mean = [i](const flat::Image& of) {
+          return (of.get("R").values[i] + of.get("G").values[i] + of.get("B").values[i]) / 3;
+        };
+        ASSERT_NEAR(rows.render[i], mean(noisy), 1e-4f * (1 + mean(noisy))) << x << " " << y;
+        ASSERT_NEAR(rows.brightness(y, x), mean(result), 1e-5f * (1 + mean(result))) << x << " " << y;
+      }
+  });
+}
+
 TEST(Layers, MemoryDoesNotChangeTheResult) {
   const DeepImage image = reference::makeNoisyFrame(44, 203, 1);
   const nn::LayersNet net = randomNet();

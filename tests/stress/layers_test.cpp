@@ -201,12 +201,13 @@ TEST(StressLayers, FollowsTheExposure) {
   EXPECT_LT(worst, kBound);
 }
 
-// Exposure and mean depth are of the whole frame; given these, poison out of reach changes no bits.
+// Exposure, mean depth and the curve of light are of the whole frame; given these, poison out of reach changes no bits.
 TEST(StressLayers, PoisonStaysWithinReach) {
   constexpr int kLength = 200;
   const DeepImage clean = reference::renderFrame({.width = kLength, .height = 4}).noisy;
   const nn::LayersNet& net = randomNet();
-  const LayerScale scale = measureLayers(layerSource(clean), {});
+  LayerScale scale = measureLayers(layerSource(clean), {});
+  scale.light = measureLight(net, {}, layerSource(clean), scale);
   const auto flatOf = [&](const DeepImage& image) {
     flat::Image result;
     denoiseLayers(net, {}, layerSource(image), scale, image.dataWindow.y0, image.dataWindow.y1,
