@@ -57,9 +57,14 @@ void LightCurve::add(float denoised, float render) {
 void LightCurve::fit() {
   double light = 0, all = 0;
   for (const Sums& s : sums_) light += s.denoised, all += s.denoised * s.lacking();
-  changes_ = std::fabs(all) > kTolerance * light;
-  const double part = changes_ ? 1 - kTolerance * light / std::fabs(all) : 0;
-  for (size_t j = 0; j < sums_.size(); ++j) factors_[j] = float(1 + part * sums_[j].lacking());
+  double left = std::max(0.0, std::fabs(all) - kTolerance * light);
+  changes_ = left > 0;
+  for (size_t j = sums_.size(); j-- > 0;) {
+    const double lacking = sums_[j].lacking(), own = std::copysign(1.0, all) * lacking * sums_[j].denoised;
+    const double taken = std::clamp(own, 0.0, left);
+    factors_[j] = taken > 0 ? float(1 + taken / own * lacking) : 1;
+    left -= taken;
+  }
 }
 
 float LightCurve::factor(float denoised) const {
