@@ -88,15 +88,15 @@ Buffer<float> seen(const DeepImage& image, const Buffer<float>& weight, const st
 }
 
 // Of the alphas' noise: N times the covariance that it gives two images of the same bins.
-Buffer<float> alphaCovariance(const DeepImage& a, const DeepImage& b, const Buffer<float>& weight,
+Buffer<float> alphaCovariance(const DeepImage& first, const DeepImage& second, const Buffer<float>& weight,
                               const std::string& name) {
-  const std::span<const float> x = a.get(name), y = b.get(name), alpha = a.get("A");
-  return sums(a, [&](size_t begin, size_t end) {
+  const std::span<const float> x = first.get(name), y = second.get(name), alpha = first.get("A");
+  return sums(first, [&](size_t begin, size_t end) {
     double both = 0, ofX = 0, ofY = 0;
     for (size_t i = begin; i < end; ++i) {
       if (!(alpha[i] > 0)) continue;
-      const double w = double(weight[i]), p = double(finiteOrZero(x[i] / alpha[i])),
-                   q = double(finiteOrZero(y[i] / alpha[i]));
+      const float a = std::min(alpha[i], 1.0f);
+      const double w = double(weight[i]), p = double(finiteOrZero(x[i] / a)), q = double(finiteOrZero(y[i] / a));
       both += w * p * q;
       ofX += w * p;
       ofY += w * q;

@@ -66,7 +66,6 @@ size_t AreaMean::groupEnd(size_t first) const {
 }
 
 void AreaMean::beginRun() {
-  if (!runs_.empty() && runs_.back().firstShare == shares_.size()) return;
   runs_.push_back({.firstShare = shares_.size(), .points = kNowhere, .volumes = kNowhere});
 }
 
@@ -85,7 +84,7 @@ void AreaMean::put(const Source& source, Range range) {
   run.seen += seen;
   if (range.isPoint()) {
     run.seenOfPoints += seen;
-    if (std::isfinite(range.z)) run.depth += seen * double(range.z);
+    run.depth += seen * double(range.z);
   }
   extend(range.isPoint() ? run.points : run.volumes, range);
   passing *= 1 - part.alpha;
@@ -140,7 +139,7 @@ void AreaMean::emit(RowPlan& row) {
     } else if (!range.isPoint() && run.seenOfPoints > 0) {
       range.z = std::clamp(float(run.depth / run.seenOfPoints), range.z, range.zBack);
     }
-    row.mix(mixed_, range.z, point ? range.z : range.zBack, float(std::min(1.0, run.seen / run.left)));
+    row.mix(mixed_, range.z, point ? range.z : range.zBack, float(run.seen / run.left));
   }
 }
 

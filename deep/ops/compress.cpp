@@ -116,8 +116,7 @@ class PixelCompression {
   void write(size_t begin, const Fit& fit, RowPlan& row) {
     const std::span<const Part> parts =
         std::span<const Part>(parts_).subspan(begins_[begin], begins_[fit.end] - begins_[begin]);
-    if (parts.size() == 1 && parts[0].weight == 1 && isAsItWas(parts[0].sample, fit.range))
-      return row.keep(parts[0].sample);
+    if (parts.size() == 1 && isAsItWas(parts[0].sample, fit.range)) return row.keep(parts[0].sample);
     shares_.clear();
     double passed = 1, alpha = 0;
     for (size_t k = begin; k < fit.end; ++k) {

@@ -146,7 +146,9 @@ struct Reached {
 // Finds that, pixel by pixel.
 class PixelOpacity {
  public:
-  PixelOpacity(const Samples& samples, double opaque) : samples_(samples), least_(1 - opaque) {}
+  // `opaque` is reached by what it is as a FLOAT, too.
+  PixelOpacity(const Samples& samples, double opaque)
+      : samples_(samples), least_(1 - std::min(opaque, double(float(opaque)))) {}
 
   std::optional<Reached> find(int x, int y) {
     const Run run = runAt(samples_.image, x, y);
@@ -166,7 +168,7 @@ class PixelOpacity {
  private:
   void put(const Piece& piece) {
     const double behind = passed_ * (1 - piece.alpha);
-    if (!reached_ && float(behind) <= float(least_)) {
+    if (!reached_ && behind <= least_) {
       const Range& range = piece.range;
       const double depth = opticalDepthOf(piece, alpha_, z_, zBack_);
       const double fraction =

@@ -145,7 +145,7 @@ void Limiter::propose(uint32_t front) {
   double cost = 0;
   if (mass > 0 && a.depth != b.depth) {
     const double distance = (b.depth - a.depth) / std::max(std::abs(a.depth), std::abs(b.depth));
-    cost = a.mass * b.mass / mass * (std::isfinite(distance) ? std::abs(distance) : 2);
+    cost = a.mass * b.mass / mass * (std::isfinite(distance) ? distance : 2);
   }
   heap_.push_back({cost, front, a.version, b.version});
   std::push_heap(heap_.begin(), heap_.end());

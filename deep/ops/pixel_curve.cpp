@@ -142,6 +142,7 @@ class VolumeFit {
     for (size_t c = 0; c < kCurves; ++c) {
       const double ownSlope = (curve_.points[k + 1][c] - curve_.points[k][c]) * ownSteep;
       const double slope = (curve_.points[end_][c] - curve_.points[begin_][c]) * steep;
+      // Bound without a logarithm, which most steps need no more than.
       const bool flat = (std::abs(ownSlope) * own + std::abs(slope) * other) / 8 <= slack;
       if (flat || !(ownSlope * slope > 0) || own == other) continue;
       const double y = std::log(ownSlope / slope) / (own - other);

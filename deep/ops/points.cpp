@@ -60,8 +60,9 @@ struct Source {
         colour{image.tryGet("R"), image.tryGet("G"), image.tryGet("B")} {}
 };
 
+// Of a value in [0,1].
 uint8_t toByte(double value) {
-  return uint8_t(std::lround(std::min(std::max(value, 0.0), 1.0) * 255));
+  return uint8_t(std::lround(value * 255));
 }
 
 struct Point {

@@ -54,19 +54,22 @@ TEST(ApplyFlat, ShowsThePixelsOwnAlpha) {
   const auto denoiser = [&](const flat::Image& noisy, const Progress& progress) {
     const Buffer<float>& seen = noisy.get("A").values;
     EXPECT_TRUE(std::equal(alpha.begin(), alpha.end(), seen.begin(), seen.end()));
+    EXPECT_EQ(noisy.attributes.at("fathom:spp"), "24");
     return halved(noisy, progress);
   };
+  image.attributes.set("fathom:spp", 24);
   const DeepImage after = applyFlat(std::move(image), denoiser, false);
   EXPECT_EQ(after.get("A")[0], 1);
 }
 
 TEST(ApplyFlat, CountsAndThrowsOn) {
   DeepImage image = pixels();
-  image.find("G")->values[3] = NAN;
+  for (const char* name : {"G", "B"}) image.find(name)->values[3] = NAN;
+  image.find("B")->values[4] = NAN;
   DenoiseStats stats;
   applyFlat(image.copy(), halved, false, {}, &stats);
   EXPECT_EQ(stats.counts.at("pixels"), 63u);
-  EXPECT_EQ(stats.counts.at("non-finite samples"), 1u);
+  EXPECT_EQ(stats.counts.at("non-finite samples"), 2u);
   EXPECT_TRUE(stats.seconds.contains("base"));
   EXPECT_THROW(applyFlat(
                    image.copy(), [](const flat::Image&, const Progress&) -> flat::Image { fail("no"); }, false),

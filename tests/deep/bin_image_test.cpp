@@ -80,6 +80,16 @@ TEST(BinImage, WhatCannotBeSeenOrUsedIsPassedOver) {
     for (const float v : plane.values) ASSERT_TRUE(std::isfinite(v)) << plane.name;
 }
 
+TEST(BinImage, WhatIsHardlyThereIsPassedOver) {
+  DeepImage image = reference::renderFrame().noisy;
+  size_t pixel = 0;
+  while (image.count(pixel) < 2) ++pixel;
+  const size_t first = size_t(image.offsets[pixel]);
+  image.get("A")[first] = 1e-8f;
+  EXPECT_FLOAT_EQ(binImages(image, inputsOf(image), 1)[0].get("R").values[pixel],
+                  image.get("R")[first + 1] / image.get("A")[first + 1]);
+}
+
 TEST(BinImage, SharesAreTheEffectiveAlpha) {
   const DeepImage image = reference::renderFrame().noisy;
   const Buffer<float> weight = effectiveAlpha(image);
@@ -103,6 +113,24 @@ TEST(FlatNoisy, FlattensAsFlattenDoes) {
 }
 
 // Bins made of camera samples that are known: the pixel's variance is that of all of them.
+// Half covered, by one bin; nothing tells how many camera samples there were, but those of the bin.
+TEST(FlatNoisy, OfAPixelThatIsHalfCovered) {
+  DeepImage image{{0, 0, 1, 1}, {0, 0, 1, 1}, Buffer<uint64_t>(2, 0), {}, {}};
+  image.offsets[1] = 1;
+  for (const auto& [name, value] : {std::pair{"R", 1.0f},
+                                    {"G", 1.0f},
+                                    {"B", 1.0f},
+                                    {"A", 0.5f},
+                                    {"Z", 5.0f},
+                                    {"samples", 8.0f},
+                                    {"variance.Z", 0.25f}})
+    image.add(name, PixelType::Float).values.fill(value);
+  const flat::Image flat = flattenNoisy(image, inputsOf(image));
+  EXPECT_EQ(flat.get("samples").values[0], 16);
+  EXPECT_EQ(flat.get("Z").values[0], 5);
+  EXPECT_FLOAT_EQ(flat.get("variance.Z").values[0], 0.25f) << "of what is seen";
+}
+
 TEST(FlatNoisy, VarianceIsThatOfTheCameraSamples) {
   const std::array<std::vector<double>, 3> samples{{{1, 2, 4}, {0.5, 0.25}, {3}}};
   const double spp = 8;  // two of them saw nothing

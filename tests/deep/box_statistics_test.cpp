@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
 #include "deep/ops/sample.h"
+#include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {
@@ -71,6 +73,15 @@ TEST(BoxStatistics, BinsAreThoseOfEachPixel) {
       EXPECT_NEAR(found.bins[i].depth, expected[i].depth / weight[i], 1e-6);
     }
   }
+}
+
+TEST(BoxStatistics, WhatIsInfinitelyFarHasNoSayInTheDepth) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  const DeepImage image = reference::makeDeep({{{.alpha = 0.5f}}, {{.z = infinity, .zBack = infinity, .alpha = 1}}}, 2);
+  const BoxStatistics found = boxStatistics(image, image.dataWindow, {"R", "B", "B"});
+  ASSERT_EQ(found.bins.size(), 1u);
+  EXPECT_EQ(found.bins[0].depth, 1);
+  EXPECT_EQ(found.bins[0].alpha, 0.75);
 }
 
 TEST(BoxStatistics, CountsAreThoseOfTheCroppedImage) {

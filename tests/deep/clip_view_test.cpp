@@ -83,14 +83,25 @@ TEST(ClipView, IsFlattenOfClip) {
 // The quick way for colours and the one for any channels say the same.
 TEST(ClipView, OfFewChannelsIsThatOfMany) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
-    const DeepImage image = anyImage(seed, seed % 2 == 0);
+    DeepImage image = anyImage(seed, seed % 2 == 0);
+    for (const char* name : {"B", "diffuse.B"})  // four colours are more than are composited at once
+      std::ranges::copy(std::as_const(image).get("R"), image.add(name, PixelType::Float).values.begin());
     for (const DepthRange& range : {DepthRange{-0.5f, 2}, DepthRange{-0.5f, 2, 0.25f}, DepthRange{-0.5f, 2, 0, true}}) {
       const flat::Image many = clipView(image, image.dataWindow, 1, range, kChannels);
       const flat::Image few = clipView(image, image.dataWindow, 1, range, {"R", "N.X"});
       for (const flat::Plane& plane : few.planes)
         EXPECT_TRUE(std::ranges::equal(plane.values, many.get(plane.name).values));
+      const flat::Image four = clipView(image, image.dataWindow, 1, range, {"R", "N.X", "B", "diffuse.B"});
+      for (const char* name : {"R", "B", "diffuse.B"})
+        EXPECT_TRUE(std::ranges::equal(four.get(name).values, many.get("R").values)) << name;
     }
   }
+}
+
+TEST(ClipView, SumsEndAtTheLargest) {
+  const DeepImage image = reference::makeDeep({{{1, 1, 0, 9e14f}, {2, 2, 0, 9e14f}}}, 1);
+  for (const auto& names : {std::vector<std::string>{"R"}, {"R", "R", "B", "A"}})
+    EXPECT_EQ(clipView(image, image.dataWindow, 1, {}, names).get("R").values[0], flatten(image).get("R").values[0]);
 }
 
 TEST(ClipView, OfAnyBoxAndStepTakesPixelsOfTheWhole) {

@@ -94,6 +94,18 @@ Pixels randomSamples(size_t count, unsigned seed) {
   return pixels;
 }
 
+// Alphas as HALF tell thousands of camera samples only roughly; the attribute tells them all.
+TEST(Cluster, KnowsItsCameraSamplesByTheAttribute) {
+  constexpr int kSpp = 1500;
+  const DeepImage exact = cameraImage({std::vector<CameraSample>(kSpp, {2, 0.5})}, kSpp, 1);
+  DeepImage image = exact.copy();
+  image.find("A")->type = PixelType::Half;
+  for (float& alpha : image.get("A")) alpha = alpha * (1 - 0x1p-11f);  // as far off as HALF may be
+  const DeepImage bins = cluster(image, findBins(image, kPpuScale, {}));
+  ASSERT_EQ(bins.samples(), 1u);
+  EXPECT_EQ(bins.get("A")[0], 1) << "all that the camera sent ended there";
+}
+
 TEST(BinLayout, AgreesWithTheTwin) {
   std::mt19937 random(1);
   for (const double E : {0.0, 0.5, 1.0, 2.0, 3.0})

@@ -350,6 +350,20 @@ TEST(Denoise, EmissionAndBinsWithoutSamplesStay) {
 
 // A renderer that writes what stands behind an opaque surface: no camera sample saw it, nothing tells what it should
 // be, and whoever takes the front away wants it back.
+TEST(Denoise, AlphasBeyondOneAreOne) {
+  const RenderedFrame frame = renderFrame();
+  for (const bool variances : {true, false}) {
+    DeepImage image = frame.noisy.copy();
+    if (!variances) dropGroup(image, "variance.");
+    const DeepImage expected = run(image);
+    for (float& alpha : image.get("A"))
+      if (alpha == 1) alpha = 1.5f;
+    const DeepImage out = run(image);
+    for (const std::string& name : kColours)
+      for (size_t b = 0; b < out.samples(); ++b) ASSERT_EQ(out.get(name)[b], expected.get(name)[b]) << name;
+  }
+}
+
 TEST(Denoise, WhatIsHiddenKeepsItsColours) {
   for (const bool counted : {true, false}) {
     DeepImage image = renderFrame().noisy;

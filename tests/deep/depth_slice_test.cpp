@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
@@ -61,6 +63,20 @@ TEST(DepthSlice, CellsCompositedAreThePixel) {
         }
     }
   }
+}
+
+TEST(DepthSlice, APointOnAPlaneIsBehindIt) {
+  const flat::Image slice = depthSlice(makeDeep({{{3, 3, 0.5f}}}, 1), -2, 3, 4, {1, 5}, 2, {"R"});
+  EXPECT_EQ(slice.get("A").values[0], 0);
+  EXPECT_EQ(slice.get("A").values[1], 0.5f);
+}
+
+// Two volumes whose alpha together rounds to 1 are thick, not opaque.
+TEST(DepthSlice, WhatIsNearlyOpaqueIsCutAsAVolume) {
+  constexpr float kAlpha = 0x1.fffffep-1f;
+  const flat::Image slice =
+      depthSlice(makeDeep({{{1, 5, kAlpha}, {1, 5, kAlpha}, {1, 5, kAlpha}}}, 1), -2, 3, 4, {1, 5}, 16, {"R"});
+  EXPECT_NEAR(slice.get("A").values[0], -std::expm1(-3.0 * 24 * std::log(2.0) / 16), 1e-5);
 }
 
 TEST(DepthSlice, LeavesOutWhatIsNotOnTheAxis) {

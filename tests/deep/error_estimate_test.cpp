@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "deep/channels.h"
 #include "deep/flat_noisy.h"
 #include "deep/flatten.h"
 #include "tests/reference/rendered_frame.h"
@@ -24,8 +25,12 @@ class ErrorEstimateOfDeep : public ::testing::Test {
   // The sum of the estimates for what a denoiser makes of the frame.
   template <class Denoiser>
   double estimate(const Denoiser& denoiser) const {
-    DeepImage denoised = denoiser(frame.noisy.copy(), Progress());
-    addFlattenedErrors(frame.noisy, inputs, denoiser, {.probes = 4}, {}, denoised);
+    return estimate(frame.noisy, denoiser);
+  }
+  template <class Denoiser>
+  double estimate(const DeepImage& noisy, const Denoiser& denoiser) const {
+    DeepImage denoised = denoiser(noisy.copy(), Progress());
+    addFlattenedErrors(noisy, inputs, denoiser, {.probes = 4}, {}, denoised);
     const flat::Image flat = flatten(denoised);
     double sum = 0;
     for (const char* name : {"error.R", "error.G", "error.B"})
@@ -35,11 +40,12 @@ class ErrorEstimateOfDeep : public ::testing::Test {
       }
     return sum;
   }
-  double noise() const {
-    const flat::Image noisy = flattenNoisy(frame.noisy, inputs);
+  double noise() const { return noise(frame.noisy); }
+  double noise(const DeepImage& noisy) const {
+    const flat::Image flat = flattenNoisy(noisy, inputs);
     double sum = 0;
     for (const char* name : {"variance.R", "variance.G", "variance.B"})
-      for (const float v : noisy.get(name).values) sum += double(v);
+      for (const float v : flat.get(name).values) sum += double(v);
     return sum;
   }
 };
@@ -47,6 +53,24 @@ class ErrorEstimateOfDeep : public ::testing::Test {
 TEST_F(ErrorEstimateOfDeep, WhoChangesNothingErrsByTheNoise) {
   const double error = estimate([](DeepImage image, const Progress&) { return image; });
   EXPECT_NEAR(error / noise(), 1, 0.1);
+}
+
+// What is half transparent tells its noise as well, and what is more than opaque is opaque.
+TEST_F(ErrorEstimateOfDeep, WhateverTheLastAlphaIs) {
+  const auto same = [](DeepImage image, const Progress&) { return image; };
+  DeepImage thin = frame.noisy.copy(), thick = frame.noisy.copy();
+  for (size_t b = 0; b < thin.samples(); ++b) {
+    if (frame.noisy.get("A")[b] < 1) continue;
+    for (Channel& channel : thin.channels) {
+      const Role role = roleOf(channel);
+      if (role == Role::Premultiplied || role == Role::Half || channel.name.ends_with("samples"))
+        channel.values[b] *= 0.5f;
+    }
+    thin.get("A")[b] = 0.5f;
+    thick.get("A")[b] = 1.5f;
+  }
+  EXPECT_NEAR(estimate(thin, same) / noise(thin), 1, 0.1);
+  EXPECT_NEAR(estimate(thick, same) / estimate(same), 1, 1e-6);
 }
 
 TEST_F(ErrorEstimateOfDeep, WhoHalvesTheLightErrsByThat) {

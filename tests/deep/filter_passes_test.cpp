@@ -167,6 +167,50 @@ TEST(Selection, EstimatesOfOneCandidateByHand) {
   EXPECT_FLOAT_EQ(other.error[0].row(0)[0], 3 * ((0.5625f + 0.25f) / 2 - 2 * 0.25f - between));
 }
 
+TEST(Selection, WithoutHalvesTheVarianceIsTold) {
+  OnePixel pixel(1, 0);
+  pixel.data.halves = false;
+  pixel.data.components[0].data[7] = 0;
+  for (flat::Padded& plane : pixel.variance.value) {
+    plane = flat::Padded(1, 1, 0);
+    plane.row(0)[0] = 0.5f;
+  }
+  Candidates candidates(pixel.data, 1, {});
+  pixel.add(0, 1.25f, 0, 2, candidates);
+  EXPECT_FLOAT_EQ(candidates.error[0].row(0)[0], 3 * (0.0625f - (1 - 2 * 0.25f) * 0.5f));
+}
+
+TEST(Selection, AHalfWithoutSamplesIsTheOther) {
+  OnePixel pixel(1, 0);
+  pixel.data.components[0].data[7] = 0;
+  Candidates candidates(pixel.data, 1, {ErrorEstimate::Stein, false});
+  pixel.add(0, 1.25f, 1.5f, 2, candidates);
+  EXPECT_FLOAT_EQ(candidates.error[0].row(0)[0], 3 * ((0.0625f + 0.25f) / 2 - 0.25f * 0.25f / 4));
+}
+
+TEST(Selection, BlendsByTheSquaresOfErrors) {
+  const OnePixel pixel(1, 2);
+  Candidates candidates(pixel.data, 2, {});
+  pixel.add(0, 1, 1, 1, candidates);
+  pixel.add(1, 2, 2, 1, candidates);
+  candidates.error[0].row(0)[0] = 1;
+  candidates.error[1].row(0)[0] = 2;
+  EXPECT_FLOAT_EQ(blendCandidates(pixel.data, pixel.still, std::move(candidates), 1, 0).value[0], (4 * 1 + 2) / 5.0f);
+}
+
+// Of a pixel that is half covered: the halves' flattened values, what their difference tells, and their own shares.
+TEST(Selection, PilotsAndAnswersByHand) {
+  OnePixel pixel(1, 2);
+  pixel.data.weight[0] = 0.5f;
+  Candidates candidates(pixel.data, 1, {}, {true, true});
+  pixel.add(0, 1, 2, 1, candidates);
+  const Blend blend = blendCandidates(pixel.data, pixel.still, std::move(candidates), 1, 1);
+  EXPECT_FLOAT_EQ(blend.pilot.value[0].value[0].row(0)[0], 0.5f);
+  EXPECT_FLOAT_EQ(blend.pilot.variance.value[0].row(0)[0], 0.5f * 0.5f * 0.5f);
+  EXPECT_FLOAT_EQ(blend.answer.difference[0][0], -0.5f);
+  EXPECT_FLOAT_EQ(blend.answer.share[1][0], 0.25f);
+}
+
 TEST(Selection, TheBestCandidateOfAnyBankIsTakenWhole) {
   const OnePixel pixel(1, 2);
   const float good[2] = {1.45f, 1.55f}, bad[2] = {4, 4};
@@ -180,12 +224,13 @@ TEST(Selection, TheBestCandidateOfAnyBankIsTakenWhole) {
 
 TEST(Selection, ABankThatFindsNothingTakesWhatAnotherFound) {
   const OnePixel pixel(1, 2);
-  for (const int silent : {0, 1}) {
-    Candidates candidates(pixel.data, 2, {});
-    pixel.add(silent, 0, 0, 0, candidates);
-    pixel.add(1 - silent, 1.5f, 1.5f, 1, candidates);
-    EXPECT_FLOAT_EQ(blendCandidates(pixel.data, pixel.still, std::move(candidates), 1, 0).value[0], 1.5f) << silent;
-  }
+  for (const int silent : {0, 1})
+    for (const float nothing : {0.0f, 1e-13f}) {
+      Candidates candidates(pixel.data, 2, {});
+      pixel.add(silent, 9, 9, nothing, candidates);
+      pixel.add(1 - silent, 1.5f, 1.5f, 1, candidates);
+      EXPECT_FLOAT_EQ(blendCandidates(pixel.data, pixel.still, std::move(candidates), 1, 0).value[0], 1.5f) << silent;
+    }
 }
 
 }  // namespace

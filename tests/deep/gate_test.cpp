@@ -71,6 +71,16 @@ TEST(Gate, EqualsItsTwin) {
   });
 }
 
+TEST(Gate, BinsWithoutSamplesAreToldNothing) {
+  const GateFrame frame(21, 17, 2, 0.1f, 0.2f);
+  const Buffer<flat::GateVerdict> verdicts = gate(frame.data, frame.bins, frame.still, 0.5f);
+  for (size_t b = 0; b < verdicts.size(); ++b)
+    if (frame.bins[b].samples == 0) {
+      ASSERT_EQ(verdicts[b].k, 0);
+      ASSERT_EQ(verdicts[b].noise[0], 0);
+    }
+}
+
 // A window with a bin in every pixel fills the last vector to its last lane.
 TEST(Gate, EqualsItsTwinForFullWindows) {
   GateFrame frame(20, 20, 1, 0.1f, 0.2f);

@@ -112,6 +112,43 @@ TEST_F(Guided, NothingElseChangesAndComponentsAddUp) {
     }
 }
 
+TEST_F(Guided, AComponentWithoutLightStaysDark) {
+  DeepImage image = frame.noisy.copy();
+  for (const std::string half : {"", "half0.", "half1."})
+    for (const std::string name : kNames) {
+      const auto whole = image.get(half + name), diffuse = image.get(half + "diffuse." + name);
+      std::copy(diffuse.begin(), diffuse.end(), whole.begin());
+      std::ranges::fill(image.get(half + "specular." + name), 0.0f);
+    }
+  const BaseGuide guide = makeGuide(guideInput(image, plan.inputs, false), {knows(truth), {}, {}}, plan.level);
+  const DeepImage out = denoise(image.copy(), plan, {}, nullptr, &guide);
+  for (const std::string name : kNames)
+    for (const float v : out.get("specular." + name)) ASSERT_EQ(v, 0);
+}
+
+// Glows in front, of no camera sample, and a bin that is not finite: the pixels around take the guide all the same.
+TEST_F(Guided, WhatHasNoSayKeepsNoPixelFromItsGuide) {
+  const reference::RenderedFrame glowing = reference::renderFrame({.width = 64, .height = 48, .emission = true});
+  const flat::Image answer = flatten(glowing.truth);
+  DeepImage noisy = glowing.noisy.copy();
+  const size_t poisoned = noisy.offsets[30 * 64 + 30];
+  for (Channel& channel : noisy.channels)
+    if (channel.name.ends_with(".R") || channel.name == "R") channel.values[poisoned] = std::nanf("");
+  const BaseGuide guide = makeGuide(guideInput(noisy, plan.inputs, false), {knows(answer), {}, {}}, plan.level);
+  const flat::Image before = flatten(denoise(noisy.copy(), plan)),
+                    after = flatten(denoise(noisy.copy(), plan, {}, nullptr, &guide));
+  double unguided = 0, guided = 0;
+  const auto alpha = noisy.get("A");
+  for (const char* name : kNames)
+    for (size_t p = 0; p < noisy.pixels(); ++p) {
+      ASSERT_TRUE(std::isfinite(after.get(name).values[p])) << name << " of pixel " << p;
+      if (noisy.count(p) == 0 || alpha[noisy.offsets[p]] > 0) continue;
+      unguided += std::pow(double(before.get(name).values[p] - answer.get(name).values[p]), 2);
+      guided += std::pow(double(after.get(name).values[p] - answer.get(name).values[p]), 2);
+    }
+  EXPECT_LT(guided, 0.5 * unguided);
+}
+
 TEST_F(Guided, BandsOfRowsGiveTheSameBits) {
   const flat::Denoiser own = flatNlMeans(planFlattened(plan));
   const DeepImage whole = guided({own, {}, kOwnGuide});
@@ -144,6 +181,35 @@ TEST_F(Guided, GuidesOfPiecesAreThatOfTheWhole) {
       EXPECT_EQ(
           0, std::memcmp(plane.values.data(), pieces.bins[k].get(plane.name).values.data(), plane.values.size() * 4));
   }
+}
+
+TEST_F(Guided, HalvesAloneTellTheNoise) {
+  DeepImage image = frame.noisy.copy();
+  std::erase_if(image.channels, [](const Channel& channel) { return channel.name.starts_with("variance."); });
+  const DenoisePlan halves = guidedPlan(image);
+  const BaseGuide guide = makeGuide(guideInput(image, halves.inputs, false), {knows(truth), {}, {}}, halves.level);
+  const Errors before = errorsOf(denoise(image.copy(), halves), frame.truth);
+  EXPECT_LT(errorsOf(denoise(image.copy(), halves, {}, nullptr, &guide), frame.truth).flat, 0.5 * before.flat);
+}
+
+// Pictures that show hardly anything are not worth a run.
+TEST_F(Guided, FewBinsHaveNoPicture) {
+  GuideInput input = guideInput(frame.noisy, plan.inputs, true);
+  ASSERT_GE(input.shares.size(), 2u);
+  std::ranges::fill(input.shares, 0.01);
+  input.shares[0] = 1;
+  int runs = 0;
+  const flat::Denoiser bins = [&](const flat::Image& noisy, const Progress& progress) {
+    ++runs;
+    return knows(truth)(noisy, progress);
+  };
+  EXPECT_EQ(makeGuide(std::move(input), {knows(truth), bins, {}}, plan.level).bins.size(), 1u);
+  EXPECT_EQ(runs, 1);
+}
+
+TEST_F(Guided, TheGuideIsGatedOnce) {
+  EXPECT_TRUE(plan.params.gate);
+  EXPECT_FALSE(planFlattened(plan).params.gate);
 }
 
 // One bin a pixel: the deep filter is the flat one, and the flat one's guide is what is there already.

@@ -148,6 +148,20 @@ TEST(JointFilter, ATileThatNothingAsksForIsConsumedAllTheSame) {
   EXPECT_EQ(pixels, 70u * 40u);
 }
 
+TEST(JointFilter, TilesOfABandAreThoseOfTheWhole) {
+  for (const int phase : {0, 5, -3, 1000}) {
+    const JointFilterParams params;
+    const RandomFrame frame({.height = 40, .rowPhase = phase}, params, 1);
+    std::mutex guard;
+    jointFilter(
+        frame.input(), params, [](const Box&) { return 0u; },
+        [&](const FilterTile& tile) {
+          const std::lock_guard lock(guard);
+          EXPECT_TRUE(tile.box.y0 == 0 || (tile.box.y0 + phase) % kTileHeight == 0) << phase << ": " << tile.box.y0;
+        });
+  }
+}
+
 // Values that are huge but finite drown their own weights, and never become NaN.
 TEST(JointFilter, HugeValuesGiveNoNan) {
   const JointFilterParams params;

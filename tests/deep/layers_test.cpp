@@ -319,6 +319,35 @@ TEST(LayerSamples, TakeWhatThereIs) {
   EXPECT_EQ(at(nn::kSampleDepth, 2), 4);
 }
 
+TEST(LayerSamples, OddValues) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  DeepImage image = reference::makeDeep({{{1, 1, 0, 2}, {2, 2, 0, 2}, {-3, -3, 0.5f, -4}, {4, 4, 1, 1}}}, 1);
+  image.add("G", PixelType::Float).values.fill(0);
+  for (const char* name : {"variance.R", "variance.G", "variance.B"})
+    image.add(name, PixelType::Float).values.fill(infinity);
+  for (const char* name : {"coc", "lens.U", "lens.V"}) image.add(name, PixelType::Float).values.fill(-12);
+  const LayerSource source = layerSource(image);
+  ASSERT_TRUE(source.inputs.coc && source.inputs.lens);
+  LayerRow row = layerRow(image, source.inputs, {1, 2}, image.dataWindow.y0);
+  ASSERT_EQ(row.samples.count(), 2U);
+  const auto at = [&](size_t plane, size_t sample) { return row.samples.plane(plane)[sample]; };
+  EXPECT_EQ(row.emissionDepth[0], 1) << "of the first that shines";
+  EXPECT_EQ(at(3, 0), 0) << "negative light";
+  EXPECT_EQ(at(nn::kExposedAt, 0), -8);
+  EXPECT_EQ(at(12, 0), 0) << "behind the camera";
+  EXPECT_EQ(at(13, 0), -12.0f / 16);
+  EXPECT_EQ(at(14, 0), -1);
+  for (const size_t noise : {17u, 18u}) EXPECT_EQ(at(noise, 1), 0) << "unknown variance";
+  EXPECT_EQ(row.nonFinite, 0u);
+  image.get("R")[1] = infinity;
+  EXPECT_EQ(layerRow(image, source.inputs, {1, 2}, image.dataWindow.y0).nonFinite, 0u) << "emission is left out";
+  image.get("R")[3] = infinity;
+  EXPECT_EQ(layerRow(image, source.inputs, {1, 2}, image.dataWindow.y0).nonFinite, 1u);
+  image.get("R")[3] = 1e12f;  // exposed beyond all light
+  row = layerRow(image, source.inputs, {1e25f, 2}, image.dataWindow.y0);
+  EXPECT_TRUE(std::isfinite(at(3, 1)));
+}
+
 // FATHOM_LAYERS_GOLDEN: see tests/nn/layers_golden_test.cpp.
 TEST(LayerSamples, EqualsItsTraining) {
   const char* given = std::getenv("FATHOM_LAYERS_GOLDEN");

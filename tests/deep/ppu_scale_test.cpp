@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 
@@ -77,6 +78,8 @@ TEST(PpuScale, WhatIsOfNoUseIsPassedOver) {
   attributes.set("fieldOfView", 180.0f);
   EXPECT_THAT(errorOf(attributes), ::testing::HasSubstr("--ppu-scale"));
   attributes.set("cameraFov", 90.0f);
+  EXPECT_NEAR(findPpuScale(attributes, kWindow), 320, 1e-3);
+  attributes.set("fathom:ppuScale", std::numeric_limits<float>::infinity());
   EXPECT_NEAR(findPpuScale(attributes, kWindow), 320, 1e-3);
 }
 

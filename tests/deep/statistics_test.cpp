@@ -63,6 +63,15 @@ TEST(Statistics, DepthsVolumesAndDamage) {
   EXPECT_EQ(statistics.unsortedPixels, 2u);
 }
 
+TEST(Statistics, EqualDepthsAreSortedAndTheFirstPixelOfTheMostIsTold) {
+  DeepImage image = withCounts({2, 3, 3});
+  fill(image, "Z", {1, 1, 2, 2, 3, 4, 4, 4});
+  Statistics statistics;
+  statistics.add(image);
+  EXPECT_EQ(statistics.unsortedPixels, 0u);
+  EXPECT_EQ(statistics.mostX, image.dataWindow.x0 + 1);
+}
+
 TEST(Statistics, WithoutDepthsThereIsNoRange) {
   Statistics statistics;
   statistics.add(withCounts({2, 1}));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <set>
 
@@ -113,6 +114,47 @@ TEST(Still, NothingIsKnownToBeNothing) {
   // What one camera sample saw is not known.
   image.get("samples")[image.offsets[pixel]] = 1;
   EXPECT_FALSE(prepare(std::move(image), 4).activity.still[pixel]);
+}
+
+// A pixel of two bins, each half of it and of the colour 1.
+DeepImage twoBins() {
+  DeepImage image{{0, 0, 1, 1}, {0, 0, 1, 1}, Buffer<uint64_t>(2, 0), {}, {}};
+  image.offsets[1] = 2;
+  for (const char* name : {"R", "G", "B", "A", "Z", "samples"}) image.add(name, PixelType::Float).values.fill(8);
+  image.get("Z")[1] = 9;
+  for (const char* name : {"R", "G", "B", "A"}) image.get(name)[0] = 0.5f, image.get(name)[1] = 1;
+  return image;
+}
+
+// A thousandth of the colour: noise of a bin counts by the square of its part of the pixel.
+TEST(Still, TheNoiseOfAPixelIsThatOfItsBins) {
+  for (const auto& [variance, still] : {std::pair{1.6e-6f, 1}, {2.4e-6f, 0}}) {
+    DeepImage image = twoBins();
+    for (const char* name : {"variance.R", "variance.G", "variance.B"})
+      image.add(name, PixelType::Float).values.fill(variance);
+    EXPECT_EQ(prepare(std::move(image), 1).activity.still[0], still) << variance;
+  }
+  for (const auto& [apart, still] : {std::pair{2.5e-3f, 1}, {3.2e-3f, 0}}) {
+    DeepImage image = twoBins();
+    for (const char* name : {"half0.samples", "half1.samples"}) image.add(name, PixelType::Float).values.fill(4);
+    for (const std::string name : {"R", "G", "B"})
+      for (const float sign : {0.5f, -0.5f}) {
+        const Buffer<float> values = image.find(name)->values.copy();
+        Buffer<float>& half = image.add((sign > 0 ? "half0." : "half1.") + name, PixelType::Float).values;
+        for (size_t b = 0; b < 2; ++b) half[b] = values[b] * (1 + sign * apart);
+      }
+    EXPECT_EQ(prepare(std::move(image), 1).activity.still[0], still) << apart;
+  }
+}
+
+TEST(Still, WhatIsNotFiniteIsToBeFilledHoweverLittleOfThePixelItIs) {
+  DeepImage image = renderFrame({.noise = [](int, int) { return 0.0f; }}).noisy;
+  const auto alpha = image.get("A");
+  size_t pixel = 0;
+  while (image.count(pixel) < 2 || alpha[image.offsets[pixel]] > 0.3f) ++pixel;
+  for (Channel& channel : image.channels)
+    if (channel.name.starts_with("half")) channel.values[image.offsets[pixel]] = std::nanf("");
+  EXPECT_FALSE(prepare(std::move(image), 1).activity.still[pixel]);
 }
 
 TEST(Still, TilesAskForComponentsThatHaveLight) {

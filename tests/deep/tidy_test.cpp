@@ -166,6 +166,13 @@ TEST(Tidy, DropsStatisticsOnlyWhereItSplits) {
   EXPECT_EQ(split.image.samples(), 3u);  // nothing is left that the two points' own statistics would describe
 }
 
+TEST(Tidy, WhatStaysAsItIsKeepsItsState) {
+  DeepImage image = makeDeep({{{4, 4, 0.5f, 1, 4}, {4, 4, 1, 2, 5}}}, 1);
+  image.attributes.set("fathom:spp", 2);
+  image.attributes.set("deepImageState", 2);
+  EXPECT_TRUE(tidy(std::move(image)).image.attributes.getInt("deepImageState"));
+}
+
 TEST(Tidy, CameraSamplesAtTheSameDepthStayApart) {
   const Pixels pixels = {{{1, 3, 0.5f, 1, 1}, {2, 2, 0.5f, 1, 2}, {2, 2, 0.25f, 1, 3}},
                          {{4, 4, 1, 1, 4}, {4, 4, 1, 2, 5}}};

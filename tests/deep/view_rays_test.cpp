@@ -32,6 +32,12 @@ TEST(ViewRays, StartAtTheCameraAndLookAlongIt) {
   EXPECT_NEAR(ViewRays(attributes, kWindow, 90.0f, Axis::Z).at(0, 0).slope, 1, 1e-9);
 }
 
+TEST(ViewRays, AMatrixWithoutInverseIsNoPlace) {
+  Attributes attributes;
+  attributes.set("worldToCamera", std::array<float, 16>{});
+  EXPECT_FALSE(ViewRays(attributes, kWindow, 90.0f, Axis::Y).hasPlace());
+}
+
 TEST(ViewRays, CamerasThatLookBackwardsAreKnownByTheirProjection) {
   Attributes attributes;
   attributes.set("worldToCamera", std::array<float, 16>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});

@@ -42,6 +42,16 @@ TEST(ColourScale, SignsAreToldApartAndEquallyBright) {
   }
 }
 
+// Oklab to sRGB, from the definition's matrices in the other direction, inverted.
+TEST(ColourScale, AreColoursOfOklab) {
+  const std::array<std::array<double, 3>, 2> expected = {
+      {{0.9464961, 0.7663411, 0.6236484}, {0.6697261, 0.8238274, 0.9861161}}};
+  for (size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(signedColour(1)[c], expected[0][c], 1e-5);
+    EXPECT_NEAR(signedColour(-1)[c], expected[1][c], 1e-5);
+  }
+}
+
 TEST(ColourScale, IdentifiersDiffer) {
   EXPECT_EQ(identifierColour(0), (std::array<float, 3>{0, 0, 0}));
   std::set<std::array<int, 3>> seen;

@@ -67,8 +67,10 @@ TEST(CurveTable, PixelsAreTheNumbersOfTheirChannels) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> octave(-40, 16), sign(-1, 1);
   std::vector<float> values(300);
-  for (float& value : values)
-    value = std::copysign(std::min(std::exp2(octave(random)), CurveTable::kMost), sign(random));
+  for (size_t i = 0; i < values.size(); ++i) {  // every second one where screens are neither black nor white
+    const float size = std::exp2(i % 2 ? octave(random) : octave(random) / 16 - 1);
+    values[i] = std::copysign(std::min(size, CurveTable::kMost), sign(random));
+  }
   values[3] = 0;
   values[5] = -CurveTable::kMost;
   const auto step = [](const CurveTable& table, float x) { return uint32_t(table(x) * 255 + 0.5f); };

@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "flat/gate_kernel.h"
 #include "tests/reference/flat_gate.h"
 #include "tests/reference/noisy_flat.h"
 #include "tests/reference/simd_targets.h"
@@ -54,6 +55,26 @@ TEST(FlatGate, TakesBackDamageAndNotNoise) {
   const Noise noise = noiseOf(frame.noisy);
   EXPECT_LT(mean(gate(frame.noisy, noise, frame.truth)), 0.02);
   EXPECT_GT(mean(gate(frame.noisy, noise, damaged(frame, 0.3f))), 0.9);
+}
+
+TEST(FlatGate, AValueThatIsNotFiniteHasNoSay) {
+  const NoisyFlat frame = makeNoisyFlat(20, 10, 1, 0.05f);
+  Noise noise = noiseOf(frame.noisy);
+  Image denoised = damaged(frame, 0.3f);
+  denoised.find("G")->values[4 * 20 + 9] = std::numeric_limits<float>::quiet_NaN();
+  const Buffer<float> k = gate(frame.noisy, noise, denoised);
+  noise.pixel[4 * 20 + 9] = PixelNoise::Unknown;
+  const Buffer<float> expected = gate(frame.noisy, noise, damaged(frame, 0.3f));
+  for (size_t i = 0; i < k.size(); ++i) ASSERT_EQ(k[i], expected[i]) << i;
+}
+
+TEST(FlatGate, TheKernelKnowsOfNothing) {
+  GateNeighbours none;
+  const GateSample here{{0.5f, 0.5f, 0.5f}, 4, {}, 0, {}, 0};
+  EXPECT_EQ(takenBack(here, none, 2, 1e-4f).noise[0], 0);
+  GateNeighbours itself;
+  itself.add(here, 1);
+  EXPECT_EQ(takenBack(here, itself, 2, 1e-4f).k, 0) << "neither noise nor bias";
 }
 
 TEST(FlatGate, GivesTheRenderWhereThereIsNoNoise) {

@@ -79,6 +79,16 @@ TEST(Metrics, ConstantImagesHaveClosedForms) {
   EXPECT_NEAR(m.ssim, (2 * a * r + 1e-4) / (a * a + r * r + 1e-4), 1e-7);
 }
 
+TEST(Metrics, NegativeAndUnknownValues) {
+  EXPECT_DOUBLE_EQ(compare(makeImage(16, 12, 0.75f), makeImage(16, 12, -0.5f)).smape, 1.25 / 1.26);
+  Image reference = makeImage(20, 20, 0.5f);
+  addVariance(reference, 0.0125f);
+  for (const float odd : {-1.0f, std::numeric_limits<float>::quiet_NaN(), 1e20f}) {
+    for (const char* name : {"variance.R", "variance.G", "variance.B"}) reference.find(name)->values[0] = odd;
+    EXPECT_NEAR(*compare(makeImage(20, 20, 0.75f), reference).ownMse, 0.0125 * 399 / 400, 1e-8) << odd;
+  }
+}
+
 TEST(Metrics, NoiseAgreesWithThePlainTwin) {
   for (const int width : {11, 12, 37}) {
     const Image image = makeNoise(width, 23, 2), other = makeNoise(width, 23, 3);

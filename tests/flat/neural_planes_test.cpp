@@ -88,6 +88,23 @@ TEST(NeuralPlanes, NonFiniteValuesAreZeros) {
   }
 }
 
+// What is left beside a component, and what is brighter than all light.
+TEST(NeuralPlanes, OddLightIsWithinBounds) {
+  Image image = storedImage("full");
+  for (const char* name : kRgbNames) {
+    image.find(name)->values[0] = 1e-3f;
+    image.find(std::string("diffuse.") + name)->values[0] = 50;
+    image.find(name)->values[1] = 1e15f;
+    image.find(std::string("diffuse.") + name)->values[1] = 1e15f;
+  }
+  NeuralPlanes planes(image);
+  planes.select(Light::Diffuse);
+  for (size_t c = 0; c < 3; ++c) {
+    EXPECT_EQ(planes.input().planes.row(16 + c, 0)[0], 0) << "the rest is no less than nothing";
+    EXPECT_TRUE(std::isfinite(planes.input().planes.row(c, 0)[1]));
+  }
+}
+
 TEST(NeuralPlanes, ExposureFollowsTheScale) {
   Image image = reference::makeNoisyFlat(40, 30, 1).noisy;
   const float before = exposureOf(image);
@@ -96,6 +113,14 @@ TEST(NeuralPlanes, ExposureFollowsTheScale) {
   EXPECT_EQ(exposureOf(image) * 32, before);
   for (const char* name : kRgbNames) image.find(name)->values.fill(-1);
   EXPECT_EQ(exposureOf(image), 1);
+  // Eight blocks: those that are nearly black count as a thousandth of the mean.
+  Image blocks{{0, 0, 64, 8}, {0, 0, 64, 8}, {}, {}};
+  for (const char* name : kRgbNames) {
+    Buffer<float>& values = blocks.add(name, 1).values;
+    for (size_t i = 0; i < values.size(); ++i)
+      if (i % 64 < 8) values[i] = 1e-12f;
+  }
+  EXPECT_NEAR(exposureOf(blocks), 0.2 / std::pow(1e-3 * 7 / 8, 1.0 / 8), 1e-5);
 }
 
 }  // namespace

@@ -81,6 +81,8 @@ TEST(Noise, KnowsConvergedAndUnknownPixels) {
   EXPECT_EQ(noise.pixel[7], Known);
   for (const auto& plane : noise.variance)
     for (const float v : plane) EXPECT_TRUE(v >= 0 && v < 1);
+  image.find("samples")->values[2] = 4;
+  EXPECT_EQ(noiseOf(image).pixel[2], Converged);
   // Black all around is converged.
   for (int y = 2; y <= 6; ++y)
     for (int x = 2; x <= 6; ++x) {
@@ -89,6 +91,8 @@ TEST(Noise, KnowsConvergedAndUnknownPixels) {
     }
   EXPECT_EQ(noiseOf(image).pixel[40], Converged);
   EXPECT_EQ(noiseOf(image).pixel[39], Known);
+  for (const char* c : kRgbNames) image.find(c)->values[42] = 1;  // two pixels to the right
+  EXPECT_EQ(noiseOf(image).pixel[40], Known);
 }
 
 TEST(Noise, LevelIsTheMeanOfFiniteColours) {

@@ -186,6 +186,18 @@ TEST(Progressive, CandidatesWeighByTheirErrorsInAnyOrder) {
   }
 }
 
+TEST(Progressive, ACandidateWithoutErrorIsTaken) {
+  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.5f);
+  const Noise noise = noiseOf(frame.noisy);
+  std::vector<Candidate> some;
+  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0));
+  some[0].k = gate(frame.noisy, noise, some[0].denoised);
+  const Image one = mixCandidates(frame.noisy, noise, some);
+  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.8f, 0.01f));
+  const Image two = mixCandidates(frame.noisy, noise, some);
+  for (size_t i = 0; i < 96; ++i) ASSERT_NEAR(two.get("G").values[i], one.get("G").values[i], 1e-5);
+}
+
 TEST(Progressive, ACandidateThatIsNotFiniteDoesNotCount) {
   const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.1f);
   const Noise noise = noiseOf(frame.noisy);

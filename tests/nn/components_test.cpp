@@ -42,6 +42,9 @@ TEST(BlockStatistics, AreMeansAndSpreads) {
       blockStatistics(denseRows<const float>(values.data(), kInputPlanes, kHeight, kWidth), kHeight, kWidth);
   const BlockStatistics expected = {1, 11, 15, 2, std::sqrt(2.0), 0.1, std::sqrt(2.0) / 6, 13, 17, 0, -1, 1};
   for (size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], 1e-6) << i;
+  std::fill(values.end() - kHeight * kWidth, values.end(), 0.0f);  // the whole light is no component
+  EXPECT_EQ(blockStatistics(denseRows<const float>(values.data(), kInputPlanes, kHeight, kWidth), kHeight, kWidth)[11],
+            0);
 }
 
 TEST(ComponentGains, ComeWithTheWeights) {

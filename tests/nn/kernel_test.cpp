@@ -115,6 +115,10 @@ TEST(NnKernels, LogarithmsAndSplitEqualTheirTwins) {
       const std::vector<float> values = floatsOf(colour);
       std::vector<float> logarithms(values.size());
       logColour(values.data(), values.size(), Element::float32, reinterpret_cast<std::byte*>(logarithms.data()));
+      std::vector<uint16_t> halves(values.size()), expected(values.size());
+      logColour(values.data(), values.size(), Element::bfloat16, reinterpret_cast<std::byte*>(halves.data()));
+      toBfloat16(logarithms.data(), values.size(), expected.data());
+      ASSERT_EQ(halves, expected);
       for (size_t i = 0; i < values.size(); ++i)
         ASSERT_NEAR(logarithms[i], std::log1p(double(values[i])), 1e-6 * std::log1p(double(values[i])));
       for (const int block : {8, 16}) {

@@ -198,22 +198,24 @@ TEST(LayersBand, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(results[0], denoised(net, samples, 2, 48, 64));
 }
 
-// Samples in one corner of a frame: far from them nothing runs, and the answer is that of the twin, which runs everywhere.
+// Samples in opposite corners of a frame: far from them nothing runs, and the answer is that of the twin, which runs everywhere.
 TEST(LayersBand, SkipsWhatIsEmptyWithTheSameAnswer) {
   const PlainWeights weights = randomLayered(16, 4);
   const LayersNet net(fileOf(weights));
-  PlainSamples samples = randomSamples(64, 128, 3, 9);
-  for (int y = 0; y < samples.height; ++y)
-    for (int x = 0; x < samples.width; ++x)
-      if (y >= 20 || x >= 29) samples.at(y, x).clear();
-  LayersBand band(net, 64, 128, {0, 64}, 2, 32);
-  run(band, samples);
-  EXPECT_EQ(band.filtered() + band.skipped(), 2U * 2 * 4);
-  EXPECT_EQ(band.filtered(), 2U * 2);  // the corner's tile, and its neighbour, which the filter reaches from there
-  const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, 2));
-  const std::vector<float> result = denoised(net, samples, 2, 64, 32);
-  EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected));
-  EXPECT_LT(largestDifference(result, denoised(net, samples, 2)), 1e-5 * largest(expected));
+  for (const bool first : {true, false}) {
+    PlainSamples samples = randomSamples(64, 128, 3, 9);
+    for (int y = 0; y < samples.height; ++y)
+      for (int x = 0; x < samples.width; ++x)
+        if (first ? y >= 20 || x >= 29 : y < 44 || x < 99) samples.at(y, x).clear();
+    LayersBand band(net, 64, 128, {0, 64}, 2, 32);
+    run(band, samples);
+    EXPECT_EQ(band.filtered() + band.skipped(), 2U * 2 * 4);
+    EXPECT_EQ(band.filtered(), 2U * 2);  // the corner's tile, and its neighbour, which the filter reaches from there
+    const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, 2));
+    const std::vector<float> result = denoised(net, samples, 2, 64, 32);
+    EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected));
+    EXPECT_LT(largestDifference(result, denoised(net, samples, 2)), 1e-5 * largest(expected));
+  }
 }
 
 // A partition that puts everything into the second layer leaves the first exactly empty.

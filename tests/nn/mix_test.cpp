@@ -72,12 +72,12 @@ void expectNear(const Buffer<float>& found, const Volume& expected) {
   for (size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected.values[i], 1e-4 * most) << i;
 }
 
-// More than one tile a row, and a height and a width that end in the middle of the coarsest pixels' reach.
+// More than one tile in a row and in a column, and a height and a width that end in the middle of the coarsest pixels' reach.
 TEST(MixNet, EqualsItsTwin) {
   const PlainWeights weights = randomMix(1);
   const MixNet net(fileOf(weights));
   for (const int candidates : {1, 2, 3}) {
-    const Frame frame(candidates, 36, candidates == 2 ? 292 : 40);
+    const Frame frame(candidates, candidates == 1 ? 292 : 36, candidates == 2 ? 292 : 40);
     const MixTwinLogits expected = reference::mixTwin(weights, frame.own, frame.shared);
     const MixLogits found = net.run(frame.source());
     expectNear(found.share, expected.share);

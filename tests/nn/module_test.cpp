@@ -223,6 +223,25 @@ TEST(MemoryPlan, LiveValuesNeverLieOnOneAnother) {
   }
 }
 
+// A term that is made early and added late lives until then, and nothing is added in place that is of another size.
+TEST(MemoryPlan, TermsLiveUntilTheyAreAdded) {
+  PlainWeights weights;
+  for (const char* name : {"term", "a", "b", "sum"}) addConv(weights, name, 16, 16, 3, 1);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  for (const bool floats : {false, true}) {
+    WeightSource source(file);
+    Graph graph;
+    const Value in = graph.input(16), term = graph.conv(source, "term", in, {.channels = 16});
+    const Value a = graph.conv(source, "a", in, {.channels = 16}), b = graph.conv(source, "b", a, {.channels = 16});
+    const Value sum = graph.conv(source, "sum", b, {.channels = 16, .add = term});
+    graph.output(sum, floats);
+    const MemoryPlan plan = planMemory(graph, 16, 16, {16, 2}, {});
+    const Room& room = plan.rooms[size_t(plan.places[size_t(term.index)].room)];
+    EXPECT_TRUE(room.first <= 0 && room.last >= 3);
+    EXPECT_EQ(plan.addsInPlace[3], !floats);
+  }
+}
+
 TEST(Graph, ReachesAsFarAsItsLayers) {
   PlainWeights weights;
   addConv(weights, "a", 16, 16, 3, 1);

@@ -76,7 +76,9 @@ TEST(Compress, FlattensToTheSame) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const DeepImage image = randomSamples(
         {.seed = seed, .volumes = seed % 3 != 0, .most = 30, .odd = seed % 2 == 0, .sorted = seed % 5 != 0});
-    const flat::Image whole = flatten(image), small = flatten(compress(image.copy(), {.error = 0.05}));
+    const DeepImage compressed = compress(image.copy(), {.error = 0.05});
+    EXPECT_TRUE(isTidy(compressed)) << "seed " << seed;
+    const flat::Image whole = flatten(image), small = flatten(compressed);
     for (const char* name : {"R", "G", "B", "A"})
       for (size_t i = 0; i < whole.get(name).values.size(); ++i) {
         const float value = whole.get(name).values[i];
@@ -98,6 +100,13 @@ TEST(Compress, PutsSlicesTogether) {
   EXPECT_EQ(samples[0].z, 1);
   EXPECT_EQ(samples[0].zBack, pixels[0].back().zBack);
   EXPECT_NEAR(samples[0].alpha, 1 - std::pow(0.99, 1000), 1e-6);
+}
+
+// How their curves would go on behind its end has no say.
+TEST(Compress, LooksNoFurtherThanAVolume) {
+  const DeepImage image =
+      reference::makeDeep({{{.z = 1, .zBack = 1.5f, .alpha = 0.01f}, {.z = 1.5f, .zBack = 4, .alpha = 0.1f}}}, 1);
+  EXPECT_EQ(compress(image.copy(), {.error = 0.01}).samples(), 1u);
 }
 
 // An opaque volume that hides more behind it begins where a point is: it must not become one.
@@ -133,6 +142,36 @@ TEST(Compress, HardSurfacesStayWhereTheyAre) {
   EXPECT_EQ(samples[0].id, 77u);
 }
 
+// Of what is all within the error, the sample that changes most stays; where there are volumes, it is one.
+TEST(Compress, StandsWhereMostIs) {
+  const std::vector<reference::Sample> points =
+      reference::samplesOf(compress(reference::makeDeep({{{.z = 1, .zBack = 1, .alpha = 0.002f},
+                                                          {.z = 2, .zBack = 2, .alpha = 0.004f},
+                                                          {.z = 3, .zBack = 3, .alpha = 0.002f}}},
+                                                        1),
+                                    {.error = 0.01}),
+                           0);
+  ASSERT_EQ(points.size(), 1u);
+  EXPECT_EQ(points[0].z, 2);
+  EXPECT_EQ(points[0].zBack, 2);
+  const std::vector<reference::Sample> volumes = reference::samplesOf(
+      compress(reference::makeDeep({{{.z = 1, .zBack = 2, .alpha = 0.002f}, {.z = 2, .zBack = 3, .alpha = 0.003f}}}, 1),
+               {.error = 0.01}),
+      0);
+  ASSERT_EQ(volumes.size(), 1u);
+  EXPECT_EQ(volumes[0].z, 1);
+  EXPECT_EQ(volumes[0].zBack, 3);
+}
+
+// Together they would be opaque as FLOAT, and hide all from their front on.
+TEST(Compress, ThickVolumesStayApart) {
+  const float alpha = float(-std::expm1(-9));
+  DeepImage image =
+      reference::makeDeep({{{.z = 1, .zBack = 2, .alpha = alpha}, {.z = 2, .zBack = 3, .alpha = alpha}}}, 1);
+  image.add("G", PixelType::Float).values.fill(0);
+  EXPECT_LE(distanceOf(image, compress(image.copy(), {.error = 1e-3}), 0).transmittance, 1.001e-3);
+}
+
 TEST(Compress, WhatIsHiddenGoesAndEmissionStays) {
   const DeepImage image = reference::makeDeep(
       {{{.z = 1, .zBack = 1, .alpha = 1, .colour = 0.5f, .id = 5}, {.z = 2, .zBack = 2, .alpha = 0.5f, .colour = 9}},
@@ -153,6 +192,10 @@ TEST(Compress, CameraSamplesAtOneDepthStayApartInTheFlattened) {
   const DeepImage small = compress(image.copy(), {.error = 1e-6});
   EXPECT_EQ(small.samples(), 1u);
   EXPECT_NEAR(small.get("R")[0], 0.55f, 1e-6);
+  // Of what is seen of them, the first is most.
+  image = reference::makeDeep({{{.z = 1, .alpha = 0.6f, .id = 1}, {.z = 1, .alpha = 1, .id = 2}}}, 1, false);
+  image.attributes.set("fathom:spp", 2);
+  EXPECT_EQ(compress(std::move(image), {.error = 1e-6}).find("id")->ids[0], 1u);
 }
 
 TEST(Compress, ThousandsOfSamplesInOnePixel) {

@@ -97,6 +97,7 @@ TEST(Deepen, ExtinctionBecomesAlpha) {
   const DeepImage fire = deepen(onePixel(0.6f, 0, 3), {.thickness = 2, .extinction = true});
   EXPECT_EQ(fire.get("A")[0], 0);
   EXPECT_FLOAT_EQ(fire.get("R")[0], 1.2f);
+  EXPECT_EQ(deepen(onePixel(0.6f, kInfinity, 3), {.thickness = 2, .extinction = true}).get("A")[0], 0);
   EXPECT_THROW(deepen(onePixel(1, 1, 1), {.extinction = true}), Error);
 }
 

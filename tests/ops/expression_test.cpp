@@ -87,6 +87,12 @@ TEST(Expression, Unpremultiplied) {
   }
 }
 
+TEST(Expression, HalvesAreDividedByAlphaToo) {
+  DeepImage image = reference::makeDeep({{{.alpha = 0.25f}}}, 1);
+  image.add("half0.R", PixelType::Float).values.fill(0.5f);
+  EXPECT_EQ(set(image, "half0.R = half0.R + 1", true).get("half0.R")[0], 0.75f);
+}
+
 TEST(Expression, DropsWhatTheNewValuesVoid) {
   DeepImage image = randomSamples({.seed = 2});
   image.attributes.set("fathom:spp", 16);

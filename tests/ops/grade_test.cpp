@@ -114,6 +114,7 @@ TEST(Grade, FallsOffSmoothlyOverTheWidths) {
   EXPECT_EQ(gainAt(9, params), 2);
   EXPECT_EQ(gainAt(10, params), 3);
   EXPECT_EQ(gainAt(20, params), 3);
+  EXPECT_FLOAT_EQ(gainAt(21, params), 1 + 2 * (0.5625f * 1.5f));
   EXPECT_EQ(gainAt(22, params), 2);
   EXPECT_EQ(gainAt(24, params), 1);
   EXPECT_EQ(gainAt(4, params, 14), 2) << "a volume weighs as its middle";

@@ -227,6 +227,15 @@ TEST(HardHoldout, AnOpaqueVolumeHidesFromItsFront) {
     }
 }
 
+TEST(HardHoldout, AnAlphaThatIsAskedForIsReachedByOneThatIsWritten) {
+  const DeepImage image = makeDeep({{{2, 2, 1, 0.5f, 1}}}, 1);
+  for (int i = 1; i <= 99; ++i) {
+    const double opaque = i / 100.0;
+    EXPECT_EQ(hardHoldout(image, makeDeep({{{1, 1, float(opaque), 0, 1}}}, 1), opaque).samples(), 0u) << opaque;
+    EXPECT_EQ(hardHoldout(image, makeDeep({{{1, 2, float(opaque), 0, 1}}}, 1), opaque).samples(), 0u) << opaque;
+  }
+}
+
 TEST(HardHoldout, KeepsThoseThatTheEquationOfTransferDoes) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     DeepImage image = randomImage(seed);
@@ -246,6 +255,15 @@ TEST(HardHoldout, KeepsThoseThatTheEquationOfTransferDoes) {
   }
 }
 
+// Plain channels are means over a piece's samples: those of the image alone.
+TEST(Holdout, PlainChannelsAreThoseOfTheImage) {
+  DeepImage image = makeDeep({{{1, 3, 0.5f, 0.1f, 7}}}, 1);
+  image.add("coc", PixelType::Float).values.fill(5);
+  const DeepImage held = holdout(std::move(image), makeDeep({{{2, 4, 0.5f, 0, 1}}}, 1));
+  ASSERT_EQ(held.samples(), 2u);
+  for (const float coc : held.get("coc")) EXPECT_FLOAT_EQ(coc, 5);
+}
+
 TEST(HoldoutMatte, IsThePartOfAlphaThatIsSeen) {
   const DeepImage image = randomImage(2), other = randomImage(4);
   const flat::Image matte = holdoutMatte(image, other), held = flatten(holdout(image.copy(), other));
@@ -255,6 +273,7 @@ TEST(HoldoutMatte, IsThePartOfAlphaThatIsSeen) {
     const float part = matte.get("A").values[p];
     EXPECT_NEAR(part * flat.get("A").values[p], held.get("A").values[p], 1e-6);
     EXPECT_TRUE(image.count(p) > 0 || part == 1);
+    EXPECT_LE(part, 1);
   }
 }
 

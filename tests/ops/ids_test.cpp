@@ -116,6 +116,12 @@ TEST(Ids, RanksKeepTheLargest) {
   EXPECT_FLOAT_EQ(ranked.image.get("id00.A").values[0], 0.45f);
 }
 
+TEST(Ids, WhatIsNotSeenHasNoRank) {
+  const RankedIds ranked = rankIds(makeDeep({{{1, 1, 1, 0, 1}, {2, 2, 0.5f, 0, 2}}}, 1), "id", 2);
+  EXPECT_EQ(ranked.most, 1u);
+  EXPECT_EQ(std::bit_cast<uint32_t>(ranked.image.get("id00.B").values[0]), 0u);
+}
+
 TEST(Ids, NoStoredIdIsSubnormalOrNotFinite) {
   for (const uint32_t id : {0u, 1u, 0x007fffffu, 0x00800000u, 0x7f7fffffu, 0x7f800000u, 0x7fc00000u, 0xffffffffu,
                             0x80000000u, 0xdeadbeefu}) {

@@ -81,6 +81,12 @@ TEST(Keymix, PassesBitForBitWhereTheMatteIsOneOrZero) {
   EXPECT_THROW(keymix(one, zero, matte, "A"), Error);
 }
 
+TEST(Keymix, DropsWhatDescribedTheSamples) {
+  DeepImage one = tidyImage(1), zero = tidyImage(3);
+  for (DeepImage* image : {&one, &zero}) image->add("variance.R", PixelType::Float).values.fill(1);
+  EXPECT_FALSE(keymix(one, zero, matteOf(one.dataWindow, 1), "A").find("variance.R"));
+}
+
 TEST(Keymix, OfWindowsThatAreNotTheSame) {
   const DeepImage one = randomSamples({.window = {0, 0, 4, 3}, .seed = 1});
   DeepImage zero = randomSamples({.window = {10, 7, 15, 9}, .seed = 2});

@@ -6,18 +6,21 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "base/error.h"
 #include "deep/clip.h"
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
+#include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 
 namespace fathom::deep {
 namespace {
 
 using reference::randomSamples;
+using reference::Sample;
 
 void expectSamePicture(const flat::Image& a, const flat::Image& b, double bound, unsigned seed) {
   for (const char* name : {"R", "G", "B", "A"})
@@ -77,6 +80,55 @@ TEST(Limit, UnitesWhatIsClosestAndSeenLeast) {
   EXPECT_EQ(three.find("id")->ids[0], 0u);
   EXPECT_NEAR(three.get("A")[0], 0.36f, 1e-6);
   EXPECT_NEAR(three.get("Z")[0], 1.0005f, 1e-3);
+}
+
+std::vector<Sample> limited(const std::vector<Sample>& pixel, int most) {
+  return reference::samplesOf(limit(reference::makeDeep({pixel}, 1), most), 0);
+}
+
+// Two pairs equally far apart: it costs less to unite a little light with much than equal lights.
+TEST(Limit, CountsTheLightThatMoves) {
+  const auto three = limited({{.z = 1, .zBack = 1, .colour = 1},
+                              {.z = 1.1f, .zBack = 1.1f, .colour = 1},
+                              {.z = 10, .zBack = 10, .colour = 0.4f},
+                              {.z = 11, .zBack = 11, .colour = 4}},
+                             3);
+  ASSERT_EQ(three.size(), 3u);
+  EXPECT_EQ(three[0].z, 1);
+  EXPECT_EQ(three[1].z, 1.1f);
+}
+
+TEST(Limit, UnitesToWhatIsSeenMost) {
+  for (const float alpha : {0.9f, 0.1f}) {
+    const auto one = limited({{.z = 1, .zBack = 1, .alpha = alpha}, {.z = 1, .zBack = 2, .alpha = 0.5f}}, 1);
+    ASSERT_EQ(one.size(), 1u);
+    EXPECT_EQ(one[0].z, 1);
+    EXPECT_EQ(one[0].zBack, alpha > 0.5f ? 1 : 2) << "a point or a volume";
+  }
+  EXPECT_FLOAT_EQ(limited({{.z = 1, .zBack = 1, .alpha = 0.5f}, {.z = 3, .zBack = 3, .alpha = 1}}, 1)[0].z, 2);
+}
+
+TEST(Limit, WhatIsInfinitelyFarIsFarFromAll) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  const auto behind = limited({{.z = 1, .zBack = 1, .alpha = 0.5f},
+                               {.z = 2, .zBack = 2, .alpha = 0.5f},
+                               {.z = infinity, .zBack = infinity, .alpha = 1}},
+                              2);
+  ASSERT_EQ(behind.size(), 2u);
+  EXPECT_EQ(behind[1].z, infinity);
+  const auto before = limited({{.z = -infinity, .zBack = -infinity, .alpha = 0.5f},
+                               {.z = 1, .zBack = 1, .alpha = 0.5f},
+                               {.z = 2, .zBack = 2, .alpha = 0.5f}},
+                              2);
+  ASSERT_EQ(before.size(), 2u);
+  EXPECT_EQ(before[0].z, -infinity);
+  const auto unseen = limited({{.z = 1, .zBack = 1, .alpha = 0.5f},
+                               {.z = 10, .zBack = 10, .alpha = 0.5f},
+                               {.z = 11, .zBack = 11, .alpha = 0.5f},
+                               {.z = infinity, .zBack = infinity}},
+                              2);
+  ASSERT_EQ(unseen.size(), 2u);
+  EXPECT_EQ(unseen[0].z, 1) << "what nothing is seen of moves nothing";
 }
 
 TEST(Limit, IdsAreThoseOfTheSource) {

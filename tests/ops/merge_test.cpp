@@ -82,6 +82,18 @@ TEST(Merge, FillsWhatAnImageLacks) {
   EXPECT_EQ(lines[1], "left out, since not every image has it: variance.*");
 }
 
+TEST(Merge, TakesTheWiderTypeAndDropsWhatCountedTheSamples) {
+  std::vector<DeepImage> inputs;
+  for (unsigned i = 0; i < 2; ++i) {
+    inputs.push_back(randomSamples({.seed = 1 + i}));
+    inputs[i].find("G")->type = i == 0 ? PixelType::Half : PixelType::Float;
+    inputs[i].attributes.set("fathom:spp", 4);
+  }
+  const DeepImage merged = merge(inputs);
+  EXPECT_EQ(merged.find("G")->type, PixelType::Float);
+  EXPECT_FALSE(merged.attributes.getInt("fathom:spp"));
+}
+
 TEST(Merge, RefusesAChannelThatIsUintInOneImageOnly) {
   std::vector<DeepImage> inputs;
   inputs.push_back(randomSamples({.seed = 1}));

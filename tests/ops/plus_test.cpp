@@ -44,6 +44,11 @@ TEST(Plus, TheLightIsBehindWhatIsInFrontOfIt) {
   }
 }
 
+TEST(Plus, WhatIsHiddenAddsNoSample) {
+  const DeepImage image = reference::makeDeep({{{.alpha = 1, .colour = 1}, {.z = 2, .zBack = 2, .colour = 9}}}, 1);
+  EXPECT_EQ(emission(image.copy()).samples(), 1u);
+}
+
 TEST(Plus, OfLightInFrontAddsIt) {
   const DeepImage image = reference::makeDeep({{{5, 5, 0.5f, 0.25f, 1}}}, 1);
   const DeepImage sparks = reference::makeDeep({{{1, 1, 0, 0.5f, 2}, {2, 2, 0.5f, 0.5f, 3}, {3, 3, 1, 1, 4}}}, 1);

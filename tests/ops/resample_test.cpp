@@ -13,6 +13,7 @@
 #include "deep/flatten.h"
 #include "deep/ops/crop.h"
 #include "deep/tidy.h"
+#include "tests/reference/deep_samples.h"
 #include "tests/reference/random_ops.h"
 #include "tests/reference/resample.h"
 
@@ -21,6 +22,7 @@ namespace {
 
 using reference::Interval;
 using reference::randomSamples;
+using reference::Sample;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -191,6 +193,71 @@ TEST(Resample, KeepsEdgesBetweenDepthsOpaque) {
   EXPECT_EQ(result.get("A")[1], 1.0f);
   EXPECT_EQ(result.get("R")[0], 0.5f);
   EXPECT_EQ(result.get("R")[1], 3.0f);
+}
+
+// The mean of pixels of these samples.
+std::vector<Sample> meanOf(const reference::Pixels& pixels, double tolerance) {
+  const int width = int(pixels.size());
+  const AxisMap columns{.from = 3, .num = double(width)};  // where the image begins
+  return reference::samplesOf(
+      resample(reference::makeDeep(pixels, width), {.columns = columns, .tolerance = tolerance}), 0);
+}
+
+TEST(Resample, UnitesToAPointWherePointsAreMostOfWhatIsSeen) {
+  const auto points =
+      meanOf({{{.z = 10, .zBack = 10, .alpha = 0.25f}}, {{.z = 10.05f, .zBack = 10.05f, .alpha = 0.75f}}}, 0.01);
+  ASSERT_EQ(points.size(), 1u);
+  EXPECT_NEAR(points[0].z, 10.0375f, 1e-5f);
+  EXPECT_EQ(points[0].zBack, points[0].z);
+  const auto behind =
+      meanOf({{{.z = -10, .zBack = -10, .alpha = 0.25f}}, {{.z = -10.05f, .zBack = -10.05f, .alpha = 0.75f}}}, 0.01);
+  ASSERT_EQ(behind.size(), 1u) << "depths behind the camera are as near to one another";
+  EXPECT_NEAR(behind[0].z, -10.0375f, 1e-5f);
+  for (const float alpha : {0.6f, 0.3f}) {
+    const auto both =
+        meanOf({{{.z = 10, .zBack = 10, .alpha = alpha}}, {{.z = 10, .zBack = 10.05f, .alpha = 0.45f}}}, 0.01);
+    ASSERT_EQ(both.size(), 1u);
+    EXPECT_EQ(both[0].z, 10);
+    EXPECT_EQ(both[0].zBack, alpha > 0.45f ? 10 : 10.05f) << alpha;
+  }
+  const auto emission =
+      meanOf({{{.z = 10, .zBack = 10, .colour = 1}}, {{.z = 10.05f, .zBack = 10.05f, .colour = 1}}}, 0.01);
+  ASSERT_EQ(emission.size(), 1u);
+  EXPECT_EQ(emission[0].zBack, emission[0].z);
+  EXPECT_EQ(emission[0].colour, 1);
+}
+
+TEST(Resample, LeavesNoSampleOfNothing) {
+  const auto volume = meanOf({{{.z = 1, .zBack = 2, .alpha = 0.5f, .colour = 0.5f}}, {}}, 0);
+  ASSERT_EQ(volume.size(), 1u);
+  EXPECT_EQ(volume[0].z, 1);
+  EXPECT_EQ(volume[0].zBack, 2);
+  const auto opaque = meanOf({{{.z = 1, .zBack = 1, .alpha = 1}, {.z = 5, .zBack = 5, .alpha = 0.5f, .colour = 1}},
+                              {{.z = 2, .zBack = 2, .alpha = 1}, {.z = 6, .zBack = 6, .colour = 1}}},
+                             0);
+  EXPECT_EQ(opaque.size(), 2u) << "what is hidden goes";
+}
+
+// Thirds do not add up to 1 in double; what is missing must not shine through.
+TEST(Resample, OpaquePixelsStayOpaqueHoweverLittleReachesTheirLastSample) {
+  const std::vector<Sample> pixel = {{.z = 1, .zBack = 1, .alpha = 0x1.fffffep-1f},
+                                     {.z = 2, .zBack = 2, .alpha = 0x1.fffffep-1f},
+                                     {.z = 3, .zBack = 3, .alpha = 1}};
+  const auto mean = meanOf({pixel, pixel, pixel}, 0);
+  ASSERT_EQ(mean.size(), 3u);
+  EXPECT_EQ(mean[2].alpha, 1);
+}
+
+// Places that are off by rounding alone neither add a column nor make an edge.
+TEST(Resample, RoundingMakesNoEdges) {
+  const AxisMap odd{.num = 0.1, .den = 0.3};  // three times as large, or a little less
+  EXPECT_EQ(resultOf(odd, {1, 2}).begin, 3);
+  EXPECT_EQ(resultOf(odd, {1, 2}).end, 6);
+  const AxisMap far{.from = 3 - 299970.0, .num = 0.9, .den = 0.3};
+  const Cover cover(far, Filter::Box, {3, 6}, {99990, 99991});
+  double sum = 0;
+  for (const double weight : cover.weights(99990)) sum += weight;
+  EXPECT_NEAR(sum, 1, 1e-15);
 }
 
 TEST(Resample, IdsAreThoseOfTheSourceAndTheMostSeenOnesStay) {

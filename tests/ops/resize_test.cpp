@@ -25,9 +25,15 @@ TEST(Resize, FitsTheDisplayWindowIntoTheSize) {
       EXPECT_EQ(result.displayWindow.width(), width);
       EXPECT_EQ(result.displayWindow.height(), height);
       // The data window's edge lies outside of the display window's by the same part of it.
+      const double top = -2 + (result.displayWindow.y0 + 2) - 4.0 * height / 23;
+      EXPECT_EQ(result.dataWindow.y0, int(std::floor(top + 1e-9))) << height;
       const double left = 3 + (result.displayWindow.x0 - 3) - 1.0 * width / 37;
       EXPECT_EQ(result.dataWindow.x0, int(std::floor(left + 1e-9))) << width;
     }
+}
+
+TEST(Resize, TheCornerIsScaledToo) {
+  EXPECT_EQ(resizedDisplay({10, -20, 30, 20}, 10, 80), (Box{5, -40, 15, 40}));
 }
 
 TEST(Resize, KeepsTheLightOfTheWholePicture) {

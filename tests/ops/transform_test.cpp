@@ -147,6 +147,19 @@ TEST(Insert, APartIsThatOfTheWhole) {
                Error);
 }
 
+// Samples at one depth are composited otherwise where they are known to be statistics.
+TEST(Insert, APartKnowsOfStatistics) {
+  DeepImage frame = randomSamples({.seed = 1}), smoke = randomSamples({.seed = 2});
+  for (DeepImage* image : {&frame, &smoke}) {
+    image->add("samples", PixelType::Float).values.fill(4);
+    std::ranges::fill(image->get("Z"), 1.0f);
+  }
+  const flat::Image whole = flatten(insert(frame, smoke.copy(), {}));
+  const flat::Image part = flatten(insertPart(frame, smoke, {}, frame.dataWindow, 1, {"R", "A", "Z"}));
+  for (size_t i = 0; i < whole.get("R").values.size(); ++i)
+    ASSERT_EQ(part.get("R").values[i], whole.get("R").values[i]);
+}
+
 TEST(Insert, StopsWhenItIsTold) {
   std::stop_source stop;
   stop.request_stop();
