@@ -338,11 +338,11 @@ TEST(LayerSamples, OddValues) {
   EXPECT_EQ(at(13, 0), -12.0f / 16);
   EXPECT_EQ(at(14, 0), -1);
   for (const size_t noise : {17u, 18u}) EXPECT_EQ(at(noise, 1), 0) << "unknown variance";
-  EXPECT_EQ(row.nonFinite, 0u);
+  EXPECT_EQ(row.nonFinite[0], 0u);
   image.get("R")[1] = infinity;
-  EXPECT_EQ(layerRow(image, source.inputs, {1, 2}, image.dataWindow.y0).nonFinite, 0u) << "emission is left out";
+  EXPECT_EQ(layerRow(image, source.inputs, {1, 2, {}}, image.dataWindow.y0).nonFinite[0], 0u) << "emission is left out";
   image.get("R")[3] = infinity;
-  EXPECT_EQ(layerRow(image, source.inputs, {1, 2}, image.dataWindow.y0).nonFinite, 1u);
+  EXPECT_EQ(layerRow(image, source.inputs, {1, 2, {}}, image.dataWindow.y0).nonFinite[0], 1u);
   image.get("R")[3] = 1e12f;  // exposed beyond all light
   row = layerRow(image, source.inputs, {1e25f, 2}, image.dataWindow.y0);
   EXPECT_TRUE(std::isfinite(at(3, 1)));
