@@ -28,7 +28,7 @@ struct NeuralCounts {
 // negative; what is not finite in the input counts as 0. Converged pixels (flat/noise) keep the render, and a pixel with A
 // = 0 and no colour stays black; blocks of nothing but these are skipped. A scaled frame is denoised alike, to 1e-4, over twelve
 // powers of ten, by the exposure of the whole frame, in which each pixel has its share; one mirrored or turned need not be.
-// The light of a frame is kept less well than by our filter: noise with bright tails makes it up to 3 % darker (tests/stress).
+// What light the frame lacks then comes back (flat/light).
 // The same bits for any number of threads. Images may have any of the channels of DATA.md, and R, G and B at least. Adds to
 // `counts` where it is given.
 Image denoiseNeural(const nn::CompositionalNet& net, const NeuralParams& params, const Image& noisy,

@@ -8,7 +8,7 @@ a sample should lie in one layer rather than in all.
 
 import torch
 
-from loss import COARSE, EPSILON, LOGITS, SQUARED, mean_squares, relative_square, smape
+from loss import COARSE, LOGITS, SQUARED, mean_squares, relative_square, smape
 from model import half_size
 
 FEATURES = 3e-5  # as in loss.py; but at 1e-3 the features at half and quarter size died within 1500 steps
@@ -18,7 +18,6 @@ GAP = 0.1  # a relative distance in depth from which on samples belong to differ
 STEPS_BETWEEN = (1, 2, 4, 9, 27, 45)  # how far apart in the list the pairs are that are looked at
 REACH = 6  # most pixels between them
 UNDECIDED = 0.02  # weight of how far samples are from lying in one layer
-LIGHT = 4.0  # weight of the square of what part of a crop's light is lacking: SMAPE and squares relative to the reference both ask for less
 
 
 def order(result, samples):
@@ -43,12 +42,6 @@ def undecided(result, samples):
     return (samples.weight * (1 - (result.partition**2).sum(1))).sum() / (samples.weight.sum() + 1e-6)
 
 
-def lacking(colour, light):
-    """The part of each frame's light that is lacking or too much, squared."""
-    given, wanted = colour.sum((1, 2, 3)), light.sum((1, 2, 3))
-    return (((given - wanted) / (wanted + EPSILON * light[0].numel())) ** 2).clamp(max=1).mean()
-
-
 def loss(result, samples, targets, settled):
     """The error at full size, and what is to be minimised; targets (frames, 5, height, width): light, alpha, and whether they count;
     settled: from 0 to 1, how far the training is with that."""
@@ -56,7 +49,7 @@ def loss(result, samples, targets, settled):
     colour = torch.where(counts, result.colour, light)
     error = smape(colour, light)
     total = error + SQUARED * relative_square(colour, light) + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
-    total = total + LIGHT * lacking(colour, light) + ALPHA * ((result.alpha - alpha) ** 2).mean()
+    total = total + ALPHA * ((result.alpha - alpha) ** 2).mean()
     whole = counts.float()
     for coarse, weight in zip(result.coarse, COARSE):
         light, whole = half_size(light), half_size(whole)
