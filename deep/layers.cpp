@@ -234,9 +234,12 @@ flat::LightCurve emptyCurve(const LayerScale& scale) {
 
 void addLight(const LayeredRows& rows, flat::LightCurve& curve) {
   const int width = rows.frame.width();
-  for (int y = rows.y0; y < rows.y1; ++y)
-    for (int x = 0; x < width; ++x)
-      curve.add(rows.brightness(y, x), rows.render[size_t(y - rows.y0) * size_t(width) + size_t(x)]);
+  std::vector<flat::LightCurve> parts(size_t(rows.y1 - rows.y0), emptyCurve(rows.scale));
+  parallelFor(rows.y0, rows.y1, [&](int y) {
+    const size_t row = size_t(y - rows.y0);
+    for (int x = 0; x < width; ++x) parts[row].add(rows.brightness(y, x), rows.render[row * size_t(width) + size_t(x)]);
+  });
+  for (const flat::LightCurve& part : parts) curve.add(part);
 }
 
 void findFactors(const flat::LightCurve& curve, LayeredRows& rows) {

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "base/parallel.h"
 #include "flat/finite.h"
@@ -32,6 +33,13 @@ void LightCurve::Sums::add(double d, double n, double weight) {
   variance += weight * weight * (n - d) * (n - d);
 }
 
+void LightCurve::Sums::add(const Sums& other) {
+  pixels += other.pixels;
+  denoised += other.denoised;
+  render += other.render;
+  variance += other.variance;
+}
+
 // What is to be added, of the denoised light.
 double LightCurve::Sums::lacking() const {
   const double missing = render - denoised;
@@ -52,6 +60,10 @@ void LightCurve::add(float denoised, float render) {
   const Place place = placeOf(denoised);
   sums_[size_t(place.octave)].add(double(denoised), double(render), 1 - double(place.above));
   sums_[size_t(place.octave) + 1].add(double(denoised), double(render), double(place.above));
+}
+
+void LightCurve::add(const LightCurve& other) {
+  for (size_t j = 0; j < sums_.size(); ++j) sums_[j].add(other.sums_[j]);
 }
 
 void LightCurve::fit() {
@@ -75,14 +87,16 @@ float LightCurve::factor(float denoised) const {
 }
 
 Buffer<float> lightFactors(const std::array<std::span<const float>, 3>& render, std::span<const uint8_t> settled,
-                           const std::array<std::span<const float>, 3>& denoised) {
+                           const std::array<std::span<const float>, 3>& denoised, float level) {
   const size_t pixels = settled.size();
-  LevelSum levels;
-  for (size_t i = 0; i < pixels; ++i)
-    if (!settled[i]) levels.add(double(brightness(denoised, i)));
-  LightCurve curve(levels.result());
-  for (size_t i = 0; i < pixels; ++i)
-    if (!settled[i]) curve.add(brightness(denoised, i), brightness(render, i));
+  std::vector<LightCurve> parts(pixels / kGrain + 1, LightCurve(level));
+  parallelRanges(0, int(pixels), kGrain, [&](int first, int last) {
+    LightCurve& part = parts[size_t(first / kGrain)];
+    for (size_t i = size_t(first); i < size_t(last); ++i)
+      if (!settled[i]) part.add(brightness(denoised, i), brightness(render, i));
+  });
+  LightCurve curve(level);
+  for (const LightCurve& part : parts) curve.add(part);
   curve.fit();
   if (!curve.changes()) return {};
   Buffer<float> factors(pixels, 1.0f);
@@ -93,13 +107,13 @@ Buffer<float> lightFactors(const std::array<std::span<const float>, 3>& render, 
   return factors;
 }
 
-void keepLight(const Image& noisy, std::span<const uint8_t> settled, Image& denoised) {
+void keepLight(const Image& noisy, std::span<const uint8_t> settled, Image& denoised, float level) {
   std::array<std::span<const float>, 3> render, colour;
   for (size_t c = 0; c < 3; ++c) {
     render[c] = noisy.get(kRgbNames[c]).values;
     colour[c] = denoised.get(kRgbNames[c]).values;
   }
-  const Buffer<float> factors = lightFactors(render, settled, colour);
+  const Buffer<float> factors = lightFactors(render, settled, colour, level);
   if (factors.empty()) return;
   for (const Light light : {Light::Whole, Light::Diffuse, Light::Specular})
     for (const char* c : kRgbNames) {

@@ -26,6 +26,8 @@ class LightCurve {
 
   // Has no effect where the denoised light is not above 0, or the render not finite or absurd.
   void add(float denoised, float render);
+  // What another of the same level has taken.
+  void add(const LightCurve& other);
   // After the last one.
   void fit();
   // Whether any factor is not 1.
@@ -41,6 +43,7 @@ class LightCurve {
     double pixels = 0, denoised = 0, render = 0, variance = 0;
 
     void add(double d, double n, double weight);
+    void add(const Sums& other);
     double lacking() const;
   };
   struct Place {
@@ -56,11 +59,11 @@ class LightCurve {
 };
 
 // The same of R, G and B of as many pixels: a factor for each, empty where none is to be changed. Pixels in `settled` (not 0) are
-// not looked at, and keep 1.
+// not looked at, and keep 1. The same bits for any number of threads.
 Buffer<float> lightFactors(const std::array<std::span<const float>, 3>& render, std::span<const uint8_t> settled,
-                           const std::array<std::span<const float>, 3>& denoised);
+                           const std::array<std::span<const float>, 3>& denoised, float level);
 
 // Multiplies R, G and B of `denoised`, and those of its components, by these factors. Magnitudes stay at most 1e15.
-void keepLight(const Image& noisy, std::span<const uint8_t> settled, Image& denoised);
+void keepLight(const Image& noisy, std::span<const uint8_t> settled, Image& denoised, float level);
 
 }  // namespace fathom::flat

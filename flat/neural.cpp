@@ -107,7 +107,7 @@ class LightRun {
     }
   }
 
-  void keepLight(Image& result) const { flat::keepLight(noisy_, settled_, result); }
+  void keepLight(Image& result) const { flat::keepLight(noisy_, settled_, result, 1 / planes_.exposure()); }
 
  private:
   nn::BlockWorth worthOf(const nn::CompositionalInput& input, const nn::Window& block, bool open) const {

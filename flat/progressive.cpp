@@ -10,6 +10,7 @@
 #include "flat/finite.h"
 #include "flat/light.h"
 #include "flat/mix_planes.h"
+#include "flat/neural_planes.h"
 
 namespace fathom::flat {
 
@@ -179,7 +180,7 @@ Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Cand
   // The network's weights favour the darker candidate: they are learned by relative errors.
   std::vector<uint8_t> converged(result.dataWindow.area());
   for (size_t i = 0; i < converged.size(); ++i) converged[i] = noise.pixel[i] == PixelNoise::Converged;
-  keepLight(noisy, converged, result);
+  keepLight(noisy, converged, result, 1 / exposureOf(noisy));
   return result;
 }
 

@@ -13,13 +13,14 @@ namespace {
 struct Frame {
   std::array<std::vector<float>, 3> render, denoised;
   std::vector<uint8_t> settled;
+  float level = 0.6f;
 
   explicit Frame(size_t pixels) : settled(pixels, 0) {
     for (size_t c = 0; c < 3; ++c) render[c].resize(pixels), denoised[c].resize(pixels);
   }
 
   Buffer<float> factors() const {
-    return lightFactors({render[0], render[1], render[2]}, settled, {denoised[0], denoised[1], denoised[2]});
+    return lightFactors({render[0], render[1], render[2]}, settled, {denoised[0], denoised[1], denoised[2]}, level);
   }
   // Of all that is not settled.
   double light(const Buffer<float>& factors) const {
@@ -60,12 +61,9 @@ std::vector<double> plainFactors(const Frame& frame) {
   const auto mean = [](const auto& rgb, size_t i) {
     return (double(rgb[0][i]) + double(rgb[1][i]) + double(rgb[2][i])) / 3;
   };
-  double level = 0, all = 0, light = 0, looked = 0;
-  for (size_t i = 0; i < pixels; ++i)
-    if (!frame.settled[i]) level += mean(frame.denoised, i), ++looked;
-  level /= looked;
+  double all = 0, light = 0;
   const auto place = [&](size_t i, int& octave) {
-    const double relative = mean(frame.denoised, i) / level;
+    const double relative = mean(frame.denoised, i) / double(frame.level);
     octave = int(std::floor(std::log2(relative)));
     return relative / std::exp2(octave) - 1;
   };
@@ -190,6 +188,7 @@ TEST(Light, ScaledFramesAreTreatedAlike) {
   const Buffer<float> wanted = frame.factors();
   for (const float scale : {1e-6f, 1e-3f, 0.125f, 7.0f, 1e6f}) {
     Frame scaled = frame;
+    scaled.level *= scale;
     for (size_t c = 0; c < 3; ++c)
       for (auto* channel : {&scaled.render[c], &scaled.denoised[c]})
         for (float& v : *channel) v *= scale;
