@@ -17,7 +17,8 @@ constexpr int kStep = nn::LayersNet::kAlignment;
 constexpr int kTiles[] = {512, 384, 256, 128, 64};
 // Bytes of rows that are read at once, where one row is not more.
 constexpr size_t kLeastPiece = size_t(1) << 20, kMostPiece = size_t(128) << 20;
-constexpr double kTogether = 4;  // tiles that should fit at once, before they become smaller
+constexpr double kRowBytes = 6 * sizeof(float);  // of a pixel in LayeredRows, beside the band
+constexpr double kTogether = 4;                  // tiles that should fit at once, before they become smaller
 
 int rounded(int side) {
   return (side + kStep - 1) / kStep * kStep;
@@ -41,7 +42,7 @@ struct Cut {
 
 double bandBytes(const nn::LayersNet& net, int layers, const Box& window, int rows) {
   const double held = std::min(rows + 2 * net.halo(), rounded(window.height()));
-  return held * rounded(window.width()) * net.bandBytes(layers);
+  return rounded(window.width()) * (held * net.bandBytes(layers) + rows * kRowBytes);
 }
 
 Cut cutFor(const nn::LayersNet& net, const LayersParams& params, const Box& window) {
