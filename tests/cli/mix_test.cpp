@@ -103,10 +103,11 @@ TEST_F(MixCommand, DenoiseMixesAndTellsTheErrors) {
 }
 
 TEST_F(MixCommand, RefusesWhatCannotBeMixed) {
-  for (const auto& [options, text] : {std::pair("--method nlm,auto", "expected nlm, neural and oidn, or auto or layers alone"),
-                                      {"--method nlm,nlm", "expected nlm once"},
-                                      {"--method nlm,other", "found other"},
-                                      {"--method nlm,neural --mix half", "--mix"}}) {
+  for (const auto& [options, text] :
+       {std::pair("--method nlm,auto", "expected nlm, neural and oidn, or auto or layers alone"),
+        {"--method nlm,nlm", "expected nlm once"},
+        {"--method nlm,other", "found other"},
+        {"--method nlm,neural --mix half", "--mix"}}) {
     const Ran outcome = fathom(fmt::format("denoise in.exr -o out.exr {}", options));
     EXPECT_EQ(outcome.status, 2) << options;
     EXPECT_THAT(outcome.err, HasSubstr(text));

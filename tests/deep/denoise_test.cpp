@@ -2,6 +2,7 @@
 // their twins (joint_filter_test and others); its errors on renders in tests/data.
 #include "deep/denoise.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -20,7 +21,6 @@ namespace {
 using reference::binError;
 using reference::difference;
 using reference::flatError;
-using reference::FrameParams;
 using reference::RenderedFrame;
 using reference::renderFrame;
 
@@ -390,7 +390,7 @@ TEST(Denoise, NegativeColoursKeepTheirMean) {
   for (const std::string& half : halves)
     for (const std::string& rgb : kRgb) {
       for (const char* group : {"specular.", ""}) {
-        const auto value = frame.noisy.get(half + group + rgb), alpha = frame.noisy.get("A");
+        const auto value = frame.noisy.get(fmt::format("{}{}{}", half, group, rgb)), alpha = frame.noisy.get("A");
         for (size_t b = 0; b < value.size(); ++b) value[b] -= 0.3f * alpha[b];
       }
     }

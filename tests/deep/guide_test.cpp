@@ -1,5 +1,6 @@
 // What a flat denoiser's guide does to bins: they come nearer to the truth and add up to the guide, and nothing else
 // changes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -116,9 +117,9 @@ TEST_F(Guided, AComponentWithoutLightStaysDark) {
   DeepImage image = frame.noisy.copy();
   for (const std::string half : {"", "half0.", "half1."})
     for (const std::string name : kNames) {
-      const auto whole = image.get(half + name), diffuse = image.get(half + "diffuse." + name);
+      const auto whole = image.get(half + name), diffuse = image.get(fmt::format("{}diffuse.{}", half, name));
       std::copy(diffuse.begin(), diffuse.end(), whole.begin());
-      std::ranges::fill(image.get(half + "specular." + name), 0.0f);
+      std::ranges::fill(image.get(fmt::format("{}specular.{}", half, name)), 0.0f);
     }
   const BaseGuide guide = makeGuide(guideInput(image, plan.inputs, false), {knows(truth), {}, {}}, plan.level);
   const DeepImage out = denoise(image.copy(), plan, {}, nullptr, &guide);

@@ -73,7 +73,7 @@ TEST(CurveTable, PixelsAreTheNumbersOfTheirChannels) {
   }
   values[3] = 0;
   values[5] = -CurveTable::kMost;
-  const auto step = [](const CurveTable& table, float x) { return uint32_t(table(x) * 255 + 0.5f); };
+  const auto step = [](const CurveTable& table, float x) { return uint32_t(std::floor(table(x) * 255 + 0.5f)); };
   forSimdTargets([&] {
     for (size_t first = 0; first < 5; ++first)
       for (size_t count = 0; count < 40; ++count) {
