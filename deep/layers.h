@@ -1,8 +1,9 @@
 // The layered network on deep frames: a denoised flat frame, its layers as a deep image, and bins with their colours.
 //
-// Source: nn/layers.h; what it sees of samples is deep/layer_samples. A frame is read three times, in pieces of rows: once for
-// what the whole frame decides, and each band of it twice, so that what is held does not depend on how many samples a pixel
-// has. A scaled frame is denoised alike to 1e-4 over twelve powers of ten; what light it lacks comes back (flat/light).
+// Source: nn/layers.h; what it sees of samples is deep/layer_samples. A frame is read in pieces of rows: once for what
+// the whole frame decides, and each band of it twice (four times where there are several, see denoiseLayers), so that
+// what is held does not depend on how many samples a pixel has. A scaled frame is denoised alike to 1e-4 over twelve
+// powers of ten; what light it lacks comes back (flat/light).
 #pragma once
 
 #include <cstdint>
@@ -58,9 +59,10 @@ LayerScale measureLayers(const LayerSource& source, const LayersParams& params, 
 flat::LightCurve measureLight(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
                               const LayerScale& scale, const Progress& progress = {});
 
-// Rows [y0, y1) of the data window in bands, from the top; `take` gets each when it is done. Where the scale knows no light, a whole
-// frame has it measured, which takes as long again unless it is one band, and rows stay as the network makes them. The same bits for any
-// number of threads; for other bands the same to within rounding. Throws Error where `memory` does not do, and Cancelled.
+// Rows [y0, y1) of the data window in bands, from the top; `take` gets each when it is done. Where the scale knows no
+// light, that of a whole frame is measured first, which takes as long again unless it is one band; a part of a frame
+// stays as the network makes it. The same bits for any number of threads; for other bands the same to within rounding.
+// Throws Error where `memory` does not do, and Cancelled.
 void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source,
                    const LayerScale& scale, int y0, int y1, const std::function<void(const LayeredRows& rows)>& take,
                    const Progress& progress = {}, LayersCounts* counts = nullptr);

@@ -1,12 +1,12 @@
 // Gives a denoised frame back the light that it lacks.
 //
-// Source: Fathom's own. A denoiser that goes by relative errors takes light away where noise has bright tails: networks trained on
-// SMAPE leave frames 1 to 3 % darker. Over all pixels that it made about as bright, the render tells how bright they are: its noise has
-// a mean of 0, and averages out over thousands of pixels. So each octave of brightness gets a factor, linear between octaves. What an
-// octave lacks is e max(0, 1 - 2 s^2 / e^2), e being the part of its light that is missing and s the standard error of that, from the
-// residuals: nothing where noise cannot tell, or where a firefly that the denoiser removed is all that is missing. The brightest
-// octaves get it first, since a little of theirs is much of the frame's, until the frame's light is within 0.4 % of what giving
-// all of it back would make.
+// Source: Fathom's own. A denoiser that goes by relative errors takes light away where noise has bright tails: networks
+// trained on SMAPE leave frames 1 to 3 % darker. Over all pixels that it made about as bright, the render tells how
+// bright they are: its noise has a mean of 0, and averages out over thousands of pixels. So each octave of brightness
+// gets a factor, linear between octaves. What an octave lacks is e max(0, 1 - 2 s^2 / e^2), e being the part of its
+// light that is missing and s the standard error of that, from the residuals: nothing where noise cannot tell, or where
+// a firefly that the denoiser removed is all that is missing. The brightest octaves get it first, since a little of
+// theirs is much of the frame's, until the frame's light is within 0.4 % of what giving all of it back would make.
 #pragma once
 
 #include <array>
@@ -58,8 +58,8 @@ class LightCurve {
   std::array<float, 2 * kOctaves + 2> factors_{};
 };
 
-// The same of R, G and B of as many pixels: a factor for each, empty where none is to be changed. Pixels in `settled` (not 0) are
-// not looked at, and keep 1. The same bits for any number of threads.
+// The same of R, G and B of as many pixels: a factor for each, empty where none is to be changed. Pixels in `settled`
+// (not 0) are not looked at, and keep 1. The same bits for any number of threads.
 Buffer<float> lightFactors(const std::array<std::span<const float>, 3>& render, std::span<const uint8_t> settled,
                            const std::array<std::span<const float>, 3>& denoised, float level);
 

@@ -18,7 +18,8 @@ namespace fathom::flat {
 
 namespace {
 
-// Of a pixel: the planes, the colour and the network's result; ours, of three lights; a factor; and what is known of the noise.
+// Of a pixel: the planes, the colour and the network's result; ours, of three lights; a factor; and what is known of
+// the noise.
 constexpr size_t kPixelBytes = (nn::kInputPlanes + 3 + 3 + 9 + 1) * sizeof(float) + 20;
 constexpr int kLargestTile = 512, kSmallestTile = 64;  // of nn/tiles
 

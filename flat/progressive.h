@@ -72,7 +72,8 @@ Candidate makeCandidate(const Image& noisy, const Noise& noise, Answer answer, c
 std::vector<Candidate> makeCandidates(const Image& noisy, const Noise& noise, std::span<const Estimator> estimators,
                                       const ProgressiveParams& params = {}, const Progress& progress = {});
 
-// The mix of the render and one candidate or more, whose order does not matter; with a network, what light it lacks comes back (flat/light).
+// The mix of the render and one candidate or more, whose order does not matter; with a network, what light it lacks
+// comes back (flat/light).
 Image mixCandidates(const Image& noisy, const Noise& noise, std::span<const Candidate> candidates,
                     const ProgressiveParams& params = {}, const Progress& progress = {});
 
