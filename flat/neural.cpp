@@ -92,7 +92,7 @@ class LightRun {
                      params_.memory, progress);
     for (size_t c = 0; c < 3; ++c) {
       const std::string name = prefixOf(light) + kRgbNames[c];
-      take(out.data() + c * size_t(planes_.height()) * size_t(planes_.width()), noisy_.get(name).values,
+      take(c, out.data() + c * size_t(planes_.height()) * size_t(planes_.width()), noisy_.get(name).values,
            result.add(name).values);
     }
   }
@@ -131,14 +131,14 @@ class LightRun {
     counts_->skipped += uint64_t(planes_.width()) * uint64_t(planes_.height()) - done;
   }
 
-  // Out of the network's exposure.
-  void take(const float* exposed, const Buffer<float>& render, Buffer<float>& to) const {
+  // Out of the network's exposure, and times the albedo.
+  void take(size_t c, const float* exposed, const Buffer<float>& render, Buffer<float>& to) const {
     const int width = noisy_.dataWindow.width();
     parallelFor(0, noisy_.dataWindow.height(), [&](int y) {
       const float* from = exposed + size_t(y) * size_t(planes_.width());
       for (size_t x = 0; x < size_t(width); ++x) {
         const size_t i = size_t(y) * size_t(width) + x;
-        to[i] = clean(settled_[i] ? render[i] : from[x] / planes_.exposure());
+        to[i] = clean(settled_[i] ? render[i] : from[x] * planes_.restoring(c, y, int(x)));
       }
     });
   }

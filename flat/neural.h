@@ -1,7 +1,8 @@
 // The compositional network as a flat denoiser.
 //
-// Source: nn/compositional.h. Where a frame has its diffuse and its specular light apart, each is denoised by itself and
-// the results are added, as in Bako et al. 2017; the whole light else.
+// Source: nn/compositional.h. Where a frame has its diffuse and its specular light apart, each is denoised by itself, the
+// diffuse one divided by the albedo (flat/neural_planes), and the results are added, as in Bako et al. 2017; the whole
+// light else.
 #pragma once
 
 #include <atomic>

@@ -195,29 +195,37 @@ void NeuralPlanes::fillFeatures() {
   fillConstant(kGivenAt + 2, depth ? 1.0f : 0.0f);
 }
 
+float NeuralPlanes::divisor(size_t c, int y, int x) const {
+  const size_t i = ((kAlbedoAt + c) * size_t(height_) + size_t(y)) * size_t(width_) + size_t(x);
+  return divided_ ? planes_[i] + kLeastAlbedo : 1.0f;
+}
+
 void NeuralPlanes::select(Light light) {
   const Triple rgb(image_, ""), own(image_, prefixOf(light));
   if (!own.given()) fail("channel {}R: expected in the image, found none", prefixOf(light));
   const Variances variances = variancesOf(image_, light);
   const HalfLight first(image_, "half0.", light), second(image_, "half1.", light);
   const bool halves = first.given() && second.given();
+  divided_ = light == Light::Diffuse && Triple(image_, "albedo.").given();
   const float s = exposure_;
   const int width = image_.dataWindow.width();
   parallelFor(0, image_.dataWindow.height(), [&](int y) {
     for (int x = 0; x < width; ++x) {
       const size_t i = size_t(y) * size_t(width) + size_t(x);
-      float mean = 0, apart = 0;
+      float mean = 0, apart = 0, meanDivisor = 0;
       for (size_t c = 0; c < 3; ++c) {
-        const float value = own.at(c, i), exposed = std::clamp(s * value, 0.0f, kMostExposed);
+        const float value = own.at(c, i), by = divisor(c, y, x);
+        const float exposed = std::clamp(s * value / by, 0.0f, kMostExposed);
         colourRow(c, y)[x] = exposed;
         row(kColourAt + c, y)[x] = exposed;
         const float rest = light == Light::Whole ? 0.0f : std::max(rgb.at(c, i) - value, 0.0f);
         row(kRestAt + c, y)[x] = std::min(s * rest, kMostExposed);
         mean += exposed / 3;
+        meanDivisor += by / 3;
         if (halves) apart += std::abs(first.at(c, i) - second.at(c, i)) / 3;
       }
       const auto relative = [&](float deviation) {
-        return std::min(deviation * s / (mean + kDark), kLargestDeviation);
+        return std::min(deviation * s / ((mean + kDark) * meanDivisor), kLargestDeviation);
       };
       if (!halves && variances.given()) apart = kHalvesPerDeviation * variances.meanDeviation(i);
       row(kNoiseAt, y)[x] = variances.given() ? relative(variances.deviation(i)) : 0.0f;

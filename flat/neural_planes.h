@@ -1,9 +1,10 @@
 // What the compositional network sees of a frame: 24 planes, and the colour that it filters.
 //
 // Source: Fathom's own; nn/train/planes.py makes the same for training. Light is brought to one exposure first, so that a
-// frame twice as bright is denoised alike.
+// frame twice as bright is denoised alike. Diffuse light is divided by the albedo, where that is given, plus kLeastAlbedo
+// (Bako et al. 2017, section 4): textures are in the albedo already, and what falls on a surface varies less.
 //
-//   0-2    log(1 + c), c the exposed colour of the light that is denoised
+//   0-2    log(1 + c), c the exposed colour of the light that is denoised, divided as above
 //   3-8    albedo R, G, B and normal X, Y, Z
 //   9, 10  depth z / (z + its mean where something was hit), and alpha
 //   11     log(1 + the relative deviation of c), at most that of 8
@@ -24,6 +25,8 @@
 namespace fathom::flat {
 
 enum class Light { Whole, Diffuse, Specular };
+
+inline constexpr float kLeastAlbedo = 0.02f;
 
 // "", "diffuse." or "specular.": what the channels of the light begin with.
 std::string prefixOf(Light light);
@@ -46,6 +49,9 @@ class NeuralPlanes {
   // Sides are filled up to multiples of 4 by repeating the last column and row. Valid until the next selection.
   nn::CompositionalInput input() const;
 
+  // What turns a colour of the selected light, out of the network, into light of the frame.
+  float restoring(size_t c, int y, int x) const { return divisor(c, y, x) / exposure_; }
+
   float exposure() const { return exposure_; }
   int height() const { return height_; }
   int width() const { return width_; }
@@ -53,12 +59,14 @@ class NeuralPlanes {
  private:
   float* row(size_t plane, int y) { return planes_.data() + (plane * size_t(height_) + size_t(y)) * size_t(width_); }
   float* colourRow(size_t c, int y) { return colour_.data() + (c * size_t(height_) + size_t(y)) * size_t(width_); }
+  float divisor(size_t c, int y, int x) const;
   void fillFeatures();
   void fillConstant(size_t plane, float value);
   void fillRest(float* first, size_t planes) const;
 
   const Image& image_;
   float exposure_;
+  bool divided_ = false;  // the selected light, by the albedo
   int height_, width_;
   Buffer<float> planes_, colour_;
 };

@@ -43,7 +43,7 @@ int depthOf(int components) {
 
 CompositionalNet::CompositionalNet(const WeightFile& file, Precision precision) : gains_(file) {
   expectMetadata(file, "format", "fathom-compositional");
-  expectMetadata(file, "version", "1");
+  expectMetadata(file, "version", "2");
   expectMetadata(file, "inputs", std::to_string(kInputPlanes));
   width_ = widthOf(file);
   WeightSource weights(file);

@@ -27,7 +27,7 @@ BARE = 0.05  # share of crops with the colour alone
 # Few renders show hair, cloth or engraving, and a network that has seen none takes them for noise. So light is multiplied by fine
 # streaks: in so many crops, with logarithms of so large a deviation; in some of them albedo and normals show these, too.
 PATTERNED, CONTRAST = 0.35, (0.2, 0.9)
-SHOWN = {"albedo": 0.3, "normal": 0.4}
+SHOWN = {"albedo": 0.5, "normal": 0.5}
 LENGTHS = (1, 14)  # of streaks, pixels
 
 
@@ -107,7 +107,7 @@ def chosen_light(random, given, targets):
 
 
 def varied(random, stack, targets, given, scale):
-    """The planes, the noisy colour and its reference, both times the exposure, of a variation of the crop."""
+    """Of a variation of the crop: planes, colour and divisor as of `planes.planes`, and the reference times the exposure."""
     if random.random() < PATTERNED:
         stack, targets = patterned(random, stack, targets)
     name = chosen_light(random, given, targets)
@@ -120,9 +120,9 @@ def varied(random, stack, targets, given, scale):
     for layer in (*LIGHTS, "albedo"):
         stack[WHERE[layer]] = stack[WHERE[layer]][colours]
     scale = scale * 2.0 ** random.uniform(-STOPS, STOPS)
-    inputs, colour = planes(stack, given - missing(random), name, scale)
+    inputs, colour, divisor = planes(stack, given - missing(random), name, scale)
     target = scale * np.maximum(turn(targets[name], flips, transposed)[colours], 0)
-    return inputs, colour, target.astype(np.float32)
+    return inputs, colour, divisor, target.astype(np.float32)
 
 
 class Batches:
@@ -141,7 +141,7 @@ class Batches:
             yield frame, *frame.crop(*frame.corner(random, self.size), self.size)
 
     def batch(self, step, count):
-        """Planes, colours and references of `count` crops."""
+        """Planes, colours, divisors and references of `count` crops."""
         random = np.random.default_rng([self.seed, step])
         parts = [varied(random, stack, targets, frame.given, frame.exposure) for frame, stack, targets in self.crops(random, count)]
         return [np.stack(x) for x in zip(*parts)]

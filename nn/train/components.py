@@ -44,11 +44,11 @@ def rows_of(model, pair):
     frame = subject(pair)
     made, inputs = {}, {}
     for name in lights_of(frame):
-        inputs[name], colour = planes(frame.stack, frame.given, name, frame.exposure)
+        inputs[name], colour, divisor = planes(frame.stack, frame.given, name, frame.exposure)
         with torch.no_grad():
             for k in COMPONENTS:
                 result = denoised(model, torch.from_numpy(inputs[name])[None], torch.from_numpy(colour)[None], k)
-                made[name, k] = result[0].numpy().astype(np.float64) / frame.exposure
+                made[name, k] = (divisor * result[0].numpy()).astype(np.float64) / frame.exposure
     base = sum(made[name, 1] for name in inputs)
     reference = frame.reference.astype(np.float64)
     scale = 1 / (reference**2 + DARK)

@@ -42,10 +42,10 @@ def denoise(model, frame, components, split=True):
     names = LIGHTS[1:] if split and frame.given.issuperset(LIGHTS[1:]) else LIGHTS[:1]
     total = 0
     for name in names:
-        inputs, colour = planes(frame.stack, frame.given, name, frame.exposure)
+        inputs, colour, divisor = planes(frame.stack, frame.given, name, frame.exposure)
         with torch.no_grad():
             result = denoised(model, torch.from_numpy(inputs)[None], torch.from_numpy(colour)[None], components)
-        total = total + result[0].numpy() / frame.exposure
+        total = total + divisor * result[0].numpy() / frame.exposure
     return total
 
 

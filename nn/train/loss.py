@@ -35,10 +35,12 @@ def mean_squares(tensors):
     return sum((x.float() ** 2).mean() for x in tensors)
 
 
-def loss(result, reference, settling):
-    """Of `model.Result`: the error at full size, and what is to be minimised."""
-    error = smape(result.colours[0], reference)
-    total = error + SQUARED * relative_square(result.colours[0], reference)
+def loss(result, divisor, reference, settling):
+    """Of `model.Result`: the error at full size, and what is to be minimised. Coarser results are compared as they are, divided."""
+    colour = result.colours[0] * divisor
+    error = smape(colour, reference)
+    total = error + SQUARED * relative_square(colour, reference)
+    reference = reference / divisor
     total = total + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
     for colour, weight in zip(result.colours[1:], COARSE):
         reference = half_size(reference)

@@ -23,6 +23,7 @@ KIND = {"diffuse": 1.0, "specular": -1.0, "rgb": 0.0}
 KEY = 0.2  # the geometric mean of exposed blocks
 BLOCK = 8
 TINY_BLOCK = 1e-3
+LEAST_ALBEDO = 0.02
 DARK = 0.01  # keeps relative deviations of dark pixels small
 LARGEST_DEVIATION = 8
 HALVES_PER_DEVIATION = 1.6  # |half0 - half1| of a deviation of 1 of the mean
@@ -125,18 +126,21 @@ def measure(channels):
 
 
 def planes(stack, given, name, scale):
-    """The input of the network for one component of a frame, and the component's colour.
+    """The input of the network for one component of a frame, the component's colour, and what that was divided by.
 
     stack, given: as `measure` returns them; what is not in `given` counts as missing, whatever the stack has there.
-    name: one of LIGHTS. scale: the exposure. Returns float32 (24, height, width) and (3, height, width), the colour
-    times the exposure, at least 0.
+    name: one of LIGHTS. scale: the exposure. Returns float32 (24, height, width) and twice (3, height, width): the colour
+    times the exposure, at least 0, over the divisor; and that, the albedo and a little for diffuse light, 1 else.
     """
 
     def layer(which):
         return stack[WHERE[which]] if which in given else np.zeros_like(stack[WHERE[which]])
 
-    colour = np.maximum(scale * layer(name), 0)
-    mean = colour.mean(0, keepdims=True) + DARK
+    albedo = np.clip(layer("albedo"), 0, 1)
+    divided = name == "diffuse" and "albedo" in given
+    divisor = albedo + np.float32(LEAST_ALBEDO) if divided else np.ones_like(albedo)
+    colour = np.maximum(scale * layer(name), 0) / divisor
+    mean = (colour.mean(0, keepdims=True) + DARK) * divisor.mean(0, keepdims=True)
 
     def relative(x):
         return np.log1p(np.minimum(x * scale / mean, LARGEST_DEVIATION))
@@ -149,7 +153,7 @@ def planes(stack, given, name, scale):
     flags = [feature in given for feature in FEATURES] + [f"{name}.noise" in given]
     result = [
         np.log1p(colour),
-        np.clip(layer("albedo"), 0, 1),
+        albedo,
         np.clip(layer("normal"), -1, 1),
         depth / (depth + 1),
         layer("alpha") if "alpha" in given else np.ones_like(depth),
@@ -162,4 +166,4 @@ def planes(stack, given, name, scale):
         *(np.full_like(depth, flag) for flag in flags),
         np.full_like(depth, KIND[name]),
     ]
-    return np.concatenate(result).astype(np.float32, copy=False), colour.astype(np.float32, copy=False)
+    return tuple(x.astype(np.float32, copy=False) for x in (np.concatenate(result), colour, divisor))

@@ -139,12 +139,12 @@ class Training:
         """The error, what is to be minimised, and the gigaflops that it takes."""
         settings, k = self.settings, self.drawn(SHARES)
         count = settings.batch // k
-        inputs, colours, references = map(torch.from_numpy, self.batches.batch(self.step, count))
+        inputs, colours, divisors, references = map(torch.from_numpy, self.batches.batch(self.step, count))
         inputs = inputs.contiguous(memory_format=torch.channels_last)
         with self.autocast():
             result = self.model.result(inputs, colours, k)
         work = 3e-6 * gigaflops_per_megapixel(settings.width, k) * count * settings.crop**2
-        return *loss(result, references, self.step < settings.settle), work
+        return *loss(result, divisors, references, self.step < settings.settle), work
 
     def train_step(self):
         """One step; the number of gigaflops that it took."""

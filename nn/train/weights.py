@@ -9,11 +9,10 @@ import torch
 import layers_model
 import model
 
-# {model: format and further metadata} of a file.
-VERSION = "1"
+# {model: format and further metadata} of a file. Compositional denoisers of version 1 saw diffuse light as it is (planes.py).
 FORMATS = {
-    model.Compositional: {"format": "fathom-compositional", "inputs": str(model.INPUTS)},
-    layers_model.Layered: {"format": "fathom-layers", "inputs": str(layers_model.INPUTS), "embedding": str(layers_model.EMBEDDING)},
+    model.Compositional: {"format": "fathom-compositional", "version": "2", "inputs": str(model.INPUTS)},
+    layers_model.Layered: {"format": "fathom-layers", "version": "1", "inputs": str(layers_model.INPUTS), "embedding": str(layers_model.EMBEDDING)},
 }
 TYPES = {"F32": np.dtype("<f4")}
 ALIGNMENT = 8
@@ -54,7 +53,7 @@ def read_tensors(path):
 
 def save_model(path, network, metadata):
     state = {name: tensor.detach().float().numpy() for name, tensor in network.state_dict().items()}
-    fixed = {"version": VERSION, "width": str(network.width), **FORMATS[type(network)]}
+    fixed = {"width": str(network.width), **FORMATS[type(network)]}
     write_tensors(path, state, {**fixed, **metadata})
 
 
@@ -65,7 +64,7 @@ def load_model(path, kind=model.Compositional):
         width, state = saved["width"], saved["average"]
     else:
         tensors, metadata = read_tensors(path)
-        expected = {"version": VERSION, **FORMATS[kind]}
+        expected = FORMATS[kind]
         if any(metadata.get(name) != value for name, value in expected.items()):
             raise ValueError(f"{path}: expected {expected}, found {metadata}")
         width, state = int(metadata["width"]), {name: torch.from_numpy(x) for name, x in tensors.items()}

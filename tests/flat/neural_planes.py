@@ -3,7 +3,7 @@
 
     PYTHONPATH=nn/train tests/flat/neural_planes.py tests/flat/neural_planes.safetensors
 
-Tensors are CASE/in/CHANNEL, and for each light of the frame CASE/LIGHT/planes and CASE/LIGHT/colour.
+Tensors are CASE/in/CHANNEL, and for each light of the frame CASE/LIGHT/planes, /colour and /divisor.
 """
 
 import sys
@@ -63,8 +63,9 @@ def main(path):
         scale = exposure(light(channels, ""))
         stack, given = measure(channels)
         for name in (x for x in LIGHTS if component(channels, x) is not None):
-            result, colour = planes(stack, given, name, scale)
-            tensors[f"{case}/{name}/planes"], tensors[f"{case}/{name}/colour"] = result, colour
+            result, colour, divisor = planes(stack, given, name, scale)
+            for what, values in (("planes", result), ("colour", colour), ("divisor", divisor)):
+                tensors[f"{case}/{name}/{what}"] = values
         tensors.update({f"{case}/in/{name}": x for name, x in channels.items()})
     write_tensors(path, tensors)
 

@@ -45,6 +45,15 @@ void expectPlanes(const nn::ConstPlanes& found, const NeuralPlanes& size, const 
       }
 }
 
+void expectDivisor(const NeuralPlanes& planes, const nn::Tensor& expected) {
+  size_t i = 0;
+  for (size_t c = 0; c < 3; ++c)
+    for (int y = 0; y < int(expected.shape[1]); ++y)
+      for (int x = 0; x < int(expected.shape[2]); ++x, ++i)
+        ASSERT_FLOAT_EQ(planes.restoring(c, y, x) * planes.exposure(), expected.values[i])
+            << c << ", " << x << " " << y;
+}
+
 TEST(NeuralPlanes, EqualTraining) {
   int compared = 0;
   for (const char* name : {"full", "whole-variance", "halves", "light", "black"}) {
@@ -59,6 +68,7 @@ TEST(NeuralPlanes, EqualTraining) {
       planes.select(light);
       expectPlanes(planes.input().planes, planes, stored().tensors.at(tensor + "/planes"));
       expectPlanes(planes.input().colour, planes, stored().tensors.at(tensor + "/colour"));
+      expectDivisor(planes, stored().tensors.at(tensor + "/divisor"));
       ++compared;
     }
   }

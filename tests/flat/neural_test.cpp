@@ -52,28 +52,62 @@ bool same(const Image& a, const Image& b) {
   return difference(a, b) == 0;
 }
 
-// Against the network itself, on planes that are made here, and with its light kept.
-TEST(Neural, IsTheNetworkOutOfItsExposure) {
-  const Image noisy = withoutComponents(withAlpha(makeNoisyFlat(22, 14, 1).noisy));
-  NeuralPlanes planes(noisy);
-  planes.select(Light::Whole);
-  std::vector<float> expected(3 * 24 * 16);
-  nn::CompositionalNet::Workspace workspace;
-  for (const int components : {1, 2, 4}) {
-    net().denoise(planes.input(), {0, 0, 24, 16}, components, nn::denseRows(expected.data(), 3, 16, 24), workspace);
-    const Image found = denoiseNeural(net(), {.components = components}, noisy);
-    ASSERT_EQ(found.planes.size(), 3U);
-    EXPECT_EQ(found.dataWindow, noisy.dataWindow);
-    Image wanted{noisy.dataWindow, noisy.displayWindow, {}, {}};
-    for (size_t c = 0; c < 3; ++c) {
-      Buffer<float>& values = wanted.add(kRgbNames[c]).values;
-      for (size_t y = 0; y < 14; ++y)
-        for (size_t x = 0; x < 22; ++x) values[y * 22 + x] = expected[(c * 16 + y) * 24 + x] / planes.exposure();
-    }
-    keepLight(noisy, std::vector<uint8_t>(22 * 14, 0), wanted, 1 / planes.exposure());
-    for (const char* c : kRgbNames)
-      for (size_t i = 0; i < 22 * 14; ++i) ASSERT_FLOAT_EQ(found.get(c).values[i], wanted.get(c).values[i]);
+Image withAlbedo(Image image) {
+  for (size_t c = 0; c < 3; ++c) {
+    Buffer<float>& values = image.add("albedo." + std::string(kRgbNames[c])).values;
+    for (size_t i = 0; i < values.size(); ++i) values[i] = float((i * (c + 3)) % 11) / 10;
   }
+  return image;
+}
+
+// Against the network itself, on planes that are made here, and with its light kept.
+void expectTheNetwork(const Image& noisy, std::initializer_list<Light> lights, int components) {
+  NeuralPlanes planes(noisy);
+  const int width = noisy.dataWindow.width(), height = noisy.dataWindow.height();
+  const size_t area = noisy.dataWindow.area();
+  std::vector<float> out(3 * size_t(planes.height()) * size_t(planes.width()));
+  nn::CompositionalNet::Workspace workspace;
+  Image wanted{noisy.dataWindow, noisy.displayWindow, {}, {}};
+  for (const char* c : kRgbNames) wanted.add(c, 0);
+  for (const Light light : lights) {
+    planes.select(light);
+    net().denoise(planes.input(), {0, 0, planes.width(), planes.height()}, components,
+                  nn::denseRows(out.data(), 3, planes.height(), planes.width()), workspace);
+    for (size_t c = 0; c < 3; ++c) {
+      Buffer<float> values(area);
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+          const size_t i = size_t(y) * size_t(width) + size_t(x);
+          const size_t at = (c * size_t(planes.height()) + size_t(y)) * size_t(planes.width()) + size_t(x);
+          values[i] = std::max(out[at] * planes.restoring(c, y, x), 0.0f);
+          wanted.find(kRgbNames[c])->values[i] += values[i];
+        }
+      if (light != Light::Whole) wanted.add(prefixOf(light) + kRgbNames[c]).values = std::move(values);
+    }
+  }
+  keepLight(noisy, std::vector<uint8_t>(area, 0), wanted, 1 / planes.exposure());
+  const Image found = denoiseNeural(net(), {.components = components}, noisy);
+  ASSERT_EQ(found.planes.size(), wanted.planes.size());
+  EXPECT_EQ(found.dataWindow, noisy.dataWindow);
+  for (const Plane& plane : wanted.planes)
+    for (size_t i = 0; i < area; ++i)
+      ASSERT_FLOAT_EQ(found.get(plane.name).values[i], plane.values[i]) << plane.name << " " << i;
+}
+
+TEST(Neural, IsTheNetworkOutOfItsExposure) {
+  const Image noisy = withAlpha(makeNoisyFlat(22, 14, 1).noisy);
+  for (const int components : {1, 2, 4}) expectTheNetwork(withoutComponents(noisy.copy()), {Light::Whole}, components);
+  expectTheNetwork(noisy, {Light::Diffuse, Light::Specular}, 1);
+}
+
+TEST(Neural, DiffuseLightComesBackTimesTheAlbedo) {
+  const Image noisy = withAlbedo(withAlpha(makeNoisyFlat(22, 14, 1).noisy));
+  expectTheNetwork(noisy, {Light::Diffuse, Light::Specular}, 1);
+  NeuralPlanes planes(noisy);
+  planes.select(Light::Diffuse);
+  EXPECT_FLOAT_EQ(planes.restoring(1, 0, 1) * planes.exposure(), 0.4f + kLeastAlbedo);
+  planes.select(Light::Specular);
+  EXPECT_FLOAT_EQ(planes.restoring(1, 0, 1) * planes.exposure(), 1);
 }
 
 TEST(Neural, ComponentsAddUp) {

@@ -162,8 +162,8 @@ TEST(CompositionalNet, RefusesOtherFiles) {
   };
   EXPECT_EQ(message([](PlainWeights&) {}), "accepted");
   EXPECT_EQ(message([](PlainWeights& w) { w.metadata.erase("format"); }), "random: metadata format is missing");
-  EXPECT_EQ(message([](PlainWeights& w) { w.metadata["version"] = "2"; }),
-            "random, metadata version: expected 1, found 2");
+  EXPECT_EQ(message([](PlainWeights& w) { w.metadata["version"] = "1"; }),
+            "random, metadata version: expected 2, found 1");
   EXPECT_EQ(message([](PlainWeights& w) { w.metadata["inputs"] = "23"; }),
             "random, metadata inputs: expected 24, found 23");
   for (const char* width : {"", "0", "8", "-16", "999", "16x", "100000000000000000000"})

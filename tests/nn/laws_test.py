@@ -22,7 +22,7 @@ import frames
 import loss
 import planes
 import weights
-from model import COMPONENTS, TAPS, Compositional, Gather, denoised, gigaflops_per_megapixel
+from model import COMPONENTS, TAPS, Compositional, Gather, Result, denoised, gigaflops_per_megapixel
 from widen import widened
 
 torch.set_num_threads(1)
@@ -133,22 +133,26 @@ class Planes(unittest.TestCase):
             "half0.diffuse.R": 0.2, "half0.diffuse.G": 0.5, "half0.diffuse.B": 0.3,
             "half1.diffuse.R": 0.1, "half1.diffuse.G": 0.5, "half1.diffuse.B": 0.3,
         }.items()}  # fmt: skip
-        inputs, colour = network_input(channels)  # the exposure is 0.5
-        np.testing.assert_allclose(colour[:, 0, 0], [0.05, 0.25, 0.15], rtol=1e-6)
-        deviation = 0.5 * np.sqrt(0.14 / 3) / 0.16
+        inputs, colour, divisor = network_input(channels)  # the exposure is 0.5
+        np.testing.assert_allclose(divisor[:, 0, 0], [0.12, 0.22, 1.02], rtol=1e-6)
+        divided = np.array([0.05, 0.25, 0.15]) / divisor[:, 0, 0]
+        np.testing.assert_allclose(colour[:, 0, 0], divided, rtol=1e-6)
+        mean = (divided.mean() + 0.01) * (0.12 + 0.22 + 1.02) / 3
+        deviation = 0.5 * np.sqrt(0.14 / 3) / mean
         expected = [
-            *np.log1p([0.05, 0.25, 0.15]), 0.1, 0.2, 1, -1, 0.5, 0.1, 0.5, 0.5, np.log1p(deviation), 0.1, 0, 0.5,
-            np.log1p(0.5 * 0.1 / 3 / 0.16), *np.log1p([0.05, 0, 0.15]), 1, 1, 1, 1, 1,
+            *np.log1p(divided), 0.1, 0.2, 1, -1, 0.5, 0.1, 0.5, 0.5, np.log1p(deviation), 0.1, 0, 0.5,
+            np.log1p(0.5 * 0.1 / 3 / mean), *np.log1p([0.05, 0, 0.15]), 1, 1, 1, 1, 1,
         ]  # fmt: skip
         np.testing.assert_allclose(inputs[:, 3, 5], expected, rtol=1e-5, atol=1e-7)
         without = {name: value for name, value in channels.items() if not name.startswith("half")}
-        halves = np.log1p(0.5 * 1.6 * (0.1 + 0.2 + 0.3) / 3 / 0.16)
+        halves = np.log1p(0.5 * 1.6 * (0.1 + 0.2 + 0.3) / 3 / mean)
         np.testing.assert_allclose(network_input(without)[0][15], halves, rtol=1e-5)
 
     def test_colour_alone(self):
         channels = {name: value for name, value in noisy_channels().items() if name in "RGB"}
         channels["R"][3, 4], channels["G"][3, 4] = np.nan, np.inf
-        inputs, colour = network_input(channels, "rgb")
+        inputs, colour, divisor = network_input(channels, "rgb")
+        self.assertTrue((divisor == 1).all())
         self.assertTrue(np.isfinite(inputs).all())
         self.assertEqual(colour[0, 3, 4], 0)
         self.assertTrue((inputs[10] == 1).all())
@@ -161,8 +165,8 @@ class Variations(unittest.TestCase):
         targets = {name: stack[planes.WHERE[name]] for name in planes.LIGHTS}
         seen = set()
         for seed in range(60):
-            inputs, colour, target = augment.varied(np.random.default_rng(seed), stack, targets, given, 0.7)
-            np.testing.assert_allclose(colour, target, rtol=1e-6)
+            inputs, colour, divisor, target = augment.varied(np.random.default_rng(seed), stack, targets, given, 0.7)
+            np.testing.assert_allclose(colour * divisor, target, rtol=1e-6)
             self.assertTrue(np.isfinite(inputs).all())
             seen.add((inputs.shape, tuple(inputs[19:24, 0, 0])))
         self.assertGreater(len(seen), 10)  # both ways round, all kinds, with and without features
@@ -172,7 +176,7 @@ class Variations(unittest.TestCase):
         targets = {name: stack[planes.WHERE[name]] for name in planes.LIGHTS}
         lengths = np.sort(np.linalg.norm(stack[planes.WHERE["normal"]], axis=0).ravel())
         for seed in range(20):
-            inputs, _, _ = augment.varied(np.random.default_rng(seed), stack, targets, given, 0.7)
+            inputs, *_ = augment.varied(np.random.default_rng(seed), stack, targets, given, 0.7)
             if inputs[20].any():
                 found = np.sort(np.linalg.norm(inputs[6:9], axis=0).ravel())
                 np.testing.assert_allclose(found, lengths, rtol=1e-5)
@@ -202,6 +206,15 @@ class Variations(unittest.TestCase):
         self.assertAlmostEqual(float(loss.smape(a, b)), 0.2 / 0.81, places=6)
         self.assertEqual(float(loss.mask_variance(torch.full((4, 1, 3, 4, 4), 0.25))), 0)
         self.assertAlmostEqual(float(loss.mask_variance(torch.tensor([1.0, 0.0]).reshape(2, 1, 1, 1, 1))), 0.25)
+
+    def test_loss_is_that_of_the_light_with_its_albedo(self):
+        a, b, divisor = (torch.full((1, 3, 4, 4), x) for x in (0.5, 0.3, 0.2))
+        result = Result([a, loss.half_size(a)], [torch.ones(1)], [torch.zeros(1)], [torch.zeros(1)])
+        error, total = loss.loss(result, divisor, b, settling=False)
+        fine, coarse = loss.smape(0.2 * a, b), loss.smape(a, b / 0.2)
+        self.assertAlmostEqual(float(error), float(fine), places=6)
+        expected = fine + loss.SQUARED * loss.relative_square(0.2 * a, b) + loss.COARSE[0] * coarse
+        self.assertAlmostEqual(float(total), float(expected), places=6)
 
 
 class Files(unittest.TestCase):
@@ -294,7 +307,7 @@ class Files(unittest.TestCase):
         weights.write_tensors(path, tensors, metadata)
         with self.assertRaisesRegex(RuntimeError, "denoise.kernel1.bias"):
             weights.load_model(path)
-        weights.write_tensors(path, tensors, {**metadata, "version": "2"})
+        weights.write_tensors(path, tensors, {**metadata, "version": "1"})
         with self.assertRaisesRegex(ValueError, "version"):
             weights.load_model(path)
 

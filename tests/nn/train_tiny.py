@@ -102,7 +102,7 @@ def check_weights(folder):
         expect(whole, "metadata: expected what components gain")
     expected = {name: tuple(x.shape) for name, x in Compositional(16).state_dict().items()}
     expect({name: x.shape for name, x in tensors.items()} == expected, "weights: expected the layers of the model")
-    fixed = {"format": "fathom-compositional", "version": "1", "width": "16", "inputs": "24", "steps": str(STEPS)}
+    fixed = {"format": "fathom-compositional", "version": "2", "width": "16", "inputs": "24", "steps": str(STEPS)}
     expect(fixed.items() <= metadata.items(), f"metadata: expected {fixed}, found {metadata}")
     saved = torch.load(folder / "straight/checkpoint.pt")["average"]
     expect(same(dict(load_model(folder / "tiny.safetensors").state_dict()), dict(saved)), "weights: expected those of the training")

@@ -64,7 +64,7 @@ class CompositionalTwin {
 inline PlainWeights randomCompositional(int w, uint32_t seed) {
   PlainWeights result;
   result.metadata = {{"format", "fathom-compositional"},
-                     {"version", "1"},
+                     {"version", "2"},
                      {"inputs", "24"},
                      {"width", std::to_string(w)},
                      {"name", "random"}};
