@@ -80,7 +80,7 @@ LayersFrame::LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, cons
 
 std::vector<Band> LayersFrame::bands() const {
   std::vector<Band> result;
-  for (const auto& [y0, y1] : deep::layersBands(*plan_.net, plan_.params, layers_.dataWindow))
+  for (const auto& [y0, y1] : deep::layersBands(*plan_.net, plan_.params, scale_, layers_.dataWindow))
     result.push_back({y0, y1});
   return result;
 }
@@ -131,7 +131,7 @@ GuidePlan layersGuide(const LayersPlan& plan, const SourceOptions& options, bool
   };
   guide.bytes = [plan](size_t pixels, size_t scratch) {
     const int side = int(std::sqrt(double(pixels))) + 1;
-    return std::min(scratch, deep::mostLayersBytes(*plan.net, plan.params.layers, {0, 0, side, side}));
+    return std::min(scratch, deep::mostLayersBytes(*plan.net, plan.params.layers, 2, {0, 0, side, side}));
   };
   return guide;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -124,9 +125,11 @@ class RowMaker {
       };
       fill(kDiffuseAt + c, [&](uint64_t s, size_t i) { return exposed(light_.diffuseAt(c, s), i); });
       fill(kSpecularAt + c, [&](uint64_t s, size_t i) { return exposed(light_.specularAt(c, s), i); });
-      fill(nn::kExposedAt + c, [&](uint64_t s, size_t i) {
-        return std::clamp(e * light_.at(c, s) / alphas[i], -kMostExposed, kMostExposed);
-      });
+      const auto bounded = [&](float value, size_t i) {
+        return std::clamp(e * value / alphas[i], -kMostExposed, kMostExposed);
+      };
+      fill(nn::kExposedAt + c, [&](uint64_t s, size_t i) { return bounded(light_.diffuseAt(c, s), i); });
+      fill(nn::kExposedAt + 3 + c, [&](uint64_t s, size_t i) { return bounded(light_.specularAt(c, s), i); });
     }
   }
 
@@ -235,13 +238,18 @@ void LayerScaleSum::add(const DeepImage& rows, const LayerInputs& inputs) {
   const int height = rows.dataWindow.height(), width = rows.dataWindow.width();
   const size_t first = size_t(rows.dataWindow.y0 - dataWindow_.y0) * size_t(width), plane = dataWindow_.area();
   std::vector<double> depth(static_cast<size_t>(height), 0), weight(static_cast<size_t>(height), 0);
+  std::atomic<bool> diffuse = false, specular = false;
   parallelFor(0, height, [&](int y) {
     for (size_t pixel = size_t(y) * size_t(width); pixel < size_t(y + 1) * size_t(width); ++pixel) {
       std::array<double, 3> sum{};
       forSamples(
           rows, light, alpha, z, pixel,
           [&](uint64_t s, float w, float a) {
-            for (size_t c = 0; c < 3; ++c) sum[c] += double(w) * double(light.at(c, s) / a);
+            for (size_t c = 0; c < 3; ++c) {
+              sum[c] += double(w) * double(light.at(c, s) / a);
+              if (light.diffuseAt(c, s) != 0) diffuse = true;
+              if (light.specularAt(c, s) != 0) specular = true;
+            }
             depth[size_t(y)] += double(w) * double(z[s]);
             weight[size_t(y)] += double(w);
           },
@@ -250,6 +258,7 @@ void LayerScaleSum::add(const DeepImage& rows, const LayerInputs& inputs) {
     }
   });
   for (size_t y = 0; y < depth.size(); ++y) depth_ += depth[y], weight_ += weight[y];
+  diffuse_ |= diffuse, specular_ |= specular;
 }
 
 LayerScale LayerScaleSum::result() const {
@@ -258,7 +267,7 @@ LayerScale LayerScaleSum::result() const {
     std::copy_n(light_.data() + c * dataWindow_.area(), dataWindow_.area(),
                 frame.add(std::string(1, "RGB"[c])).values.data());
   const double mean = weight_ > 0 ? depth_ / weight_ : 1;
-  return {flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f, {}};
+  return {flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f, {}, diffuse_ && specular_ ? 2 : 1};
 }
 
 LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerScale& scale, int y) {

@@ -30,6 +30,8 @@ struct LayerScale {
   float exposure = 1;                          // see flat/neural_planes
   float depth = 1;                             // the mean by weight
   std::optional<flat::LightCurve> light = {};  // what the denoised light is multiplied by, where that is known
+  // Of diffuse and specular light, where the frame has both; they go through the network apart.
+  int lights = 1;
 };
 
 // Made from the rows of a frame, in any pieces from the top.
@@ -44,6 +46,7 @@ class LayerScaleSum {
   Box dataWindow_;
   Buffer<float> light_;  // [3][height][width]
   double depth_ = 0, weight_ = 0;
+  bool diffuse_ = false, specular_ = false;  // whether there is any
 };
 
 // A row as the network takes it.

@@ -40,12 +40,12 @@ struct Cut {
   int threads = 1;  // that work on tiles at once
 };
 
-double bandBytes(const nn::LayersNet& net, int layers, const Box& window, int rows) {
+double bandBytes(const nn::LayersNet& net, int layers, int lights, const Box& window, int rows) {
   const double held = std::min(rows + 2 * net.halo(), rounded(window.height()));
-  return rounded(window.width()) * (held * net.bandBytes(layers) + rows * kRowBytes);
+  return rounded(window.width()) * (held * net.bandBytes(layers, lights) + rows * kRowBytes);
 }
 
-Cut cutFor(const nn::LayersNet& net, const LayersParams& params, const Box& window) {
+Cut cutFor(const nn::LayersNet& net, const LayersParams& params, int lights, const Box& window) {
   const int height = rounded(window.height()), most = tbb::this_task_arena::max_concurrency();
   if (params.memory == 0) return {height, kTiles[0], most};
   const double memory = double(params.memory - std::min(params.memory, pieceBytes(params)));
@@ -56,9 +56,9 @@ Cut cutFor(const nn::LayersNet& net, const LayersParams& params, const Box& wind
   }
   // As many rows as leave room for one tile, then as many tiles as fit beside them.
   const double left = memory - tileBytes(net, cut.tile);
-  for (cut.rows = height; cut.rows > kStep && bandBytes(net, params.layers, window, cut.rows) > left;)
+  for (cut.rows = height; cut.rows > kStep && bandBytes(net, params.layers, lights, window, cut.rows) > left;)
     cut.rows = rounded(cut.rows / 2);
-  const double rest = memory - bandBytes(net, params.layers, window, cut.rows);
+  const double rest = memory - bandBytes(net, params.layers, lights, window, cut.rows);
   cut.threads = std::clamp(int(rest / tileBytes(net, cut.tile)), 1, most);
   return cut;
 }
@@ -92,7 +92,7 @@ class BandRun {
         y0_(y0),
         y1_(y1),
         band_(net, rounded(source.dataWindow.height()), rounded(source.dataWindow.width()),
-              {y0 / kStep * kStep, rounded(y1)}, params.layers, tile),
+              {y0 / kStep * kStep, rounded(y1)}, params.layers, scale.lights, tile),
         result_{band_,
                 scale,
                 source.dataWindow,
@@ -142,11 +142,11 @@ class BandRun {
       std::copy_n(row.emission.data() + c * width, width, result_.emission.data() + c * plane + first);
     std::copy_n(row.emissionDepth.data(), width, result_.emissionDepth.data() + first);
     const nn::SampleRow& samples = row.samples;
-    const float *weight = samples.plane(nn::kWeightInput), *colour = samples.plane(nn::kExposedAt);
+    const float* weight = samples.plane(nn::kWeightInput);
     for (size_t x = 0; x < width; ++x) {
       double sum = 0;
       for (size_t i = samples.first[x]; i < samples.first[x + 1]; ++i)
-        for (size_t c = 0; c < 3; ++c) sum += double(weight[i]) * double(colour[c * samples.count() + i]);
+        for (size_t c = 0; c < 3; ++c) sum += double(weight[i]) * double(samples.exposed(nn::SampleLight::Both, c, i));
       sum /= double(scale_.exposure);
       for (size_t c = 0; c < 3; ++c) sum += double(row.emission[c * width + x]);
       result_.render[first + x] = row.nonFinite[x] ? std::numeric_limits<float>::quiet_NaN() : float(sum / 3);
@@ -204,11 +204,11 @@ template <class Take>
 void forBands(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source, const LayerScale& scale,
               int y0, int y1, const Progress& progress, LayersCounts* counts, const Take& take) {
   const Box& window = source.dataWindow;
-  const size_t least = leastLayersBytes(net, params.layers, window);
+  const size_t least = leastLayersBytes(net, params.layers, scale.lights, window);
   if (params.memory && params.memory < least)
     fail("expected at least {} MB for the layered network, found {} MB", least / 1'000'000 + 1,
          params.memory / 1'000'000);
-  const Cut cut = cutFor(net, params, window);
+  const Cut cut = cutFor(net, params, scale.lights, window);
   tbb::task_arena arena(cut.threads);
   const int first = y0 - window.y0, last = y1 - window.y0;
   for (int y = first; y < last;) {
@@ -270,7 +270,7 @@ void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const L
                    const Progress& progress, LayersCounts* counts) {
   const Box& window = source.dataWindow;
   const bool measures = !scale.light && y0 == window.y0 && y1 == window.y1;
-  if (measures && layersBands(net, params, window).size() > 1) {
+  if (measures && layersBands(net, params, scale, window).size() > 1) {
     LayerScale told = scale;
     told.light = measureLight(net, params, source, scale, part(progress, 0, 0.5));
     denoiseLayers(net, params, source, told, y0, y1, take, part(progress, 0.5, 1), counts);
@@ -289,23 +289,25 @@ void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const L
   });
 }
 
-std::vector<std::pair<int, int>> layersBands(const nn::LayersNet& net, const LayersParams& params, const Box& window) {
-  const Cut cut = cutFor(net, params, window);
+std::vector<std::pair<int, int>> layersBands(const nn::LayersNet& net, const LayersParams& params,
+                                             const LayerScale& scale, const Box& window) {
+  const Cut cut = cutFor(net, params, scale.lights, window);
   std::vector<std::pair<int, int>> result;
   for (int y = 0; y < window.height(); y += cut.rows)
     result.emplace_back(window.y0 + y, window.y0 + std::min(y + cut.rows, window.height()));
   return result;
 }
 
-size_t leastLayersBytes(const nn::LayersNet& net, int layers, const Box& dataWindow) {
-  const double bytes = bandBytes(net, layers, dataWindow, kStep) + tileBytes(net, kTiles[std::size(kTiles) - 1]);
+size_t leastLayersBytes(const nn::LayersNet& net, int layers, int lights, const Box& dataWindow) {
+  const double bytes =
+      bandBytes(net, layers, lights, dataWindow, kStep) + tileBytes(net, kTiles[std::size(kTiles) - 1]);
   return size_t(bytes * 8 / 7) + kLeastPiece;
 }
 
-size_t mostLayersBytes(const nn::LayersNet& net, int layers, const Box& dataWindow) {
+size_t mostLayersBytes(const nn::LayersNet& net, int layers, int lights, const Box& dataWindow) {
   const double tiles = tbb::this_task_arena::max_concurrency();
   const double work =
-      bandBytes(net, layers, dataWindow, rounded(dataWindow.height())) + tiles * tileBytes(net, kTiles[0]);
+      bandBytes(net, layers, lights, dataWindow, rounded(dataWindow.height())) + tiles * tileBytes(net, kTiles[0]);
   return size_t(work) + kMostPiece;
 }
 

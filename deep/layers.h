@@ -69,10 +69,10 @@ void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const L
 
 // The rows that denoiseLayers would take a whole frame in: a run over each of them gives the same bits.
 std::vector<std::pair<int, int>> layersBands(const nn::LayersNet& net, const LayersParams& params,
-                                             const Box& dataWindow);
+                                             const LayerScale& scale, const Box& dataWindow);
 
-// Bytes that bands of the least number of rows take, and bands of a whole frame.
-size_t leastLayersBytes(const nn::LayersNet& net, int layers, const Box& dataWindow);
-size_t mostLayersBytes(const nn::LayersNet& net, int layers, const Box& dataWindow);
+// Bytes that bands of the least number of rows take, and bands of a whole frame, of one light or two.
+size_t leastLayersBytes(const nn::LayersNet& net, int layers, int lights, const Box& dataWindow);
+size_t mostLayersBytes(const nn::LayersNet& net, int layers, int lights, const Box& dataWindow);
 
 }  // namespace fathom::deep

@@ -73,18 +73,20 @@ LayersNet::LayersNet(const WeightFile& file, Precision precision) {
   for (int i = 0; i < kLayerScales; ++i) kernel_[i] = module(kernelValues_[i].graph);
 }
 
-double LayersNet::flopPerPixel(double samples, int layers) const {
-  const double second = layers > 1 ? partition_->graph().flopPerPixel() : embed_->graph().flopPerPixel();
+double LayersNet::flopPerPixel(double samples, int layers, int lights) const {
+  const double embed = embed_->graph().flopPerPixel();
+  const double second = (layers > 1 ? partition_->graph().flopPerPixel() : embed) + (lights - 1) * 2 * embed;
   double pixel = context_->graph().flopPerPixel();
   for (int i = 0; i < kLayerScales; ++i)
     pixel += layers * (kernel_[i]->graph().flopPerPixel() + 2.0 * kKernelTaps * kSplatted) / (1 << 2 * i);
-  return samples * (embed_->graph().flopPerPixel() + second) + pixel;
+  return samples * (embed + second) + lights * pixel;
 }
 
-double LayersNet::bandBytes(int layers) const {
-  const double context = double(bytesOf(element())) * kEmbedding * (2 + 1 / 4.0 + 1 / 16.0);
-  const double sums = layers * sizeof(float) * (kEmbedding + kSplatted + kLayerPlanes);
-  return sizeof(float) * kEmbedding + context + sums + 1;
+double LayersNet::bandBytes(int layers, int lights) const {
+  const double partition = double(bytesOf(element())) * kEmbedding, kernels = partition * (1 + 1 / 4.0 + 1 / 16.0);
+  const double sums = layers * sizeof(float) * (kEmbedding + kSplatted);
+  const double results = layers * sizeof(float) * kLayerPlanes;
+  return lights * (sizeof(float) * kEmbedding + kernels + sums) + partition + results + 1;
 }
 
 double LayersNet::tileBytes() const {

@@ -5,7 +5,8 @@
 // splatted with kernels of that layer at three scales. Departures: kernels are exp of clamped logits, without the frame's
 // maximum, which would tie tiles together; a hundredth is taken off each share, so that layers can be exactly empty; what
 // misses everything (alpha below 1) passes all layers; scales are joined in each layer, before compositing, so that layers
-// exist at full size. Graphs and the other departures: nn/layers_graphs.h.
+// exist at full size; diffuse and specular light are filtered apart, as pixel networks do. Graphs and the other
+// departures: nn/layers_graphs.h.
 #pragma once
 
 #include <memory>
@@ -19,13 +20,17 @@
 
 namespace fathom::nn {
 
-// Planes of a row of samples: kSampleInputs inputs, as training has them, all finite; then what is splatted.
+// Planes of a row of samples: kSampleInputs inputs, as training has them, all finite; then what is splatted, R G B of the
+// diffuse and of the specular light.
 enum SamplePlane : size_t {
   kWeightInput = 16,
   kExposedAt = kSampleInputs,
-  kSampleDepth = kExposedAt + 3,
+  kSampleDepth = kExposedAt + 6,
   kSamplePlanes
 };
+
+// What of the samples' light the network is to see and to filter.
+enum class SampleLight { Both, Diffuse, Specular };
 
 // The samples of one row of pixels, those of pixel x being [first[x], first[x + 1]) of the planes, front to back.
 // None has a weight of 0.
@@ -36,6 +41,11 @@ struct SampleRow {
   size_t count() const { return first.empty() ? 0 : first.back(); }
   float* plane(size_t p) { return values.data() + p * count(); }
   const float* plane(size_t p) const { return values.data() + p * count(); }
+  // Channel c of what is filtered of a sample.
+  float exposed(SampleLight light, size_t c, size_t sample) const {
+    const float diffuse = plane(kExposedAt + c)[sample], specular = plane(kExposedAt + 3 + c)[sample];
+    return light == SampleLight::Both ? diffuse + specular : light == SampleLight::Diffuse ? diffuse : specular;
+  }
 };
 
 class LayersNet {
@@ -49,16 +59,17 @@ class LayersNet {
   Element element() const { return context_->element(); }
   int block() const { return context_->sizes().block; }
 
-  // Arithmetic per pixel of so many samples in the network's layers and filters; borders come on top.
-  double flopPerPixel(double samples, int layers) const;
+  // Arithmetic per pixel of so many samples in the network's layers and filters, of so many lights; borders come on top.
+  double flopPerPixel(double samples, int layers, int lights = 1) const;
   // How far away samples may be that a result depends on; and those that are splatted into it.
   int halo() const { return meanHalo_ + filterHalo_; }
   int filterHalo() const { return filterHalo_; }
   // Beyond that of the filter: what the U-net sees, and what tells whether it must look at all (nn/layers_band).
   int contextHalo() const { return contextHalo_; }
   int meanHalo() const { return meanHalo_; }
-  // What a band holds per pixel, its results included; and what is worked in per pixel of a tile with its halo.
-  double bandBytes(int layers) const;
+  // What a band of one or two lights holds per pixel, its results included; and what is worked in per pixel of a tile
+  // with its halo.
+  double bandBytes(int layers, int lights) const;
   double tileBytes() const;
 
   const Module& embed() const { return *embed_; }

@@ -32,20 +32,24 @@ std::vector<uint32_t> pixelsOf(const SampleRow& row, const SampleChunk& chunk, s
 
 }  // namespace
 
-LayersBand::LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int tile)
+LayersBand::LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int lights,
+                       int tile)
     : net_(net),
       height_(height),
       width_(width),
+      layers_(layers),
       tile_(tile),
       rows_(rows),
       sumRows_(clipped(rows.around(net.filterHalo()), height)),
       meanRows_(clipped(sumRows_.around(net.meanHalo()), height)),
-      sums_(size_t(layers)) {
+      lights_(size_t(lights)) {
   for (const int side : {height, width, rows.begin, rows.end})
     if (side % LayersNet::kAlignment != 0 || side < 0) throw std::logic_error("sides are multiples of 4");
   if (layers != 1 && layers != 2 && layers != 4) throw std::logic_error("layers are 1, 2 or 4");
+  if (lights != 1 && lights != 2) throw std::logic_error("lights are 1 or 2");
+  if (lights == 2) lights_[0].light = SampleLight::Diffuse, lights_[1].light = SampleLight::Specular;
   const size_t pixels = size_t(meanHeight()) * size_t(width_);
-  mean_ = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
+  for (Light& light : lights_) light.mean = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
   occupied_ = Buffer<uint8_t>(pixels, 0);
 }
 
@@ -53,11 +57,12 @@ void LayersBand::addMeans(int y, const SampleRow& row) {
   const size_t firstPixel = size_t(y - meanRows_.begin) * size_t(width_);
   for (size_t x = 0; x + 1 < row.first.size(); ++x) occupied_[firstPixel + x] = row.first[x + 1] > row.first[x];
   const size_t groupFloats = pixelFloats() * size_t(meanHeight()) * size_t(width_);
-  embedRow(net_, row, [&](const SampleChunk& chunk) {
-    const std::vector<uint32_t> pixels = pixelsOf(row, chunk, firstPixel);
-    addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), row.plane(kWeightInput) + chunk.begin,
-                pixels.data(), chunk.count, mean_.data(), groupFloats);
-  });
+  for (Light& light : lights_)
+    embedRow(net_, row, light.light, [&](const SampleChunk& chunk) {
+      const std::vector<uint32_t> pixels = pixelsOf(row, chunk, firstPixel);
+      addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(),
+                  row.plane(kWeightInput) + chunk.begin, pixels.data(), chunk.count, light.mean.data(), groupFloats);
+    });
 }
 
 template <class There>
@@ -88,33 +93,36 @@ void LayersBand::contextTile(const Window& whole) {
   });
   if (area(tile) == 0) return;
   const Window from = grown(tile, net_.contextHalo(), height_, width_);
-  const size_t values = groups() * pixelFloats() * area(from);
-  Buffer<float> mean(values);
-  cropGroups(reinterpret_cast<const std::byte*>(mean_.data()), groups(), meanHeight(), width_,
-             pixelFloats() * sizeof(float), {from.x, from.y - meanRows_.begin, from.width, from.height},
-             reinterpret_cast<std::byte*>(mean.data()));
-  Buffer<std::byte> input(values * bytesOf(net_.element()));
-  toElements(mean.data(), values, net_.element(), input.data());
-  mean = {};
-  const auto plan = net_.context().plan(from.height, from.width);
-  Buffer<std::byte> arena(plan->layout().bytes);
-  const std::byte* inputs[] = {input.data()};
-  plan->run(inputs, arena.data());
   const Window inside = {tile.x - from.x, tile.y - from.y, tile.width, tile.height};
-  const auto take = [&](Value value, int scale, Buffer<std::byte>& to) {
-    pasteGroups(Plan::result(*plan, arena.data(), value), groups(), from.height >> scale, from.width >> scale,
-                pixelBytes(), scaled(inside, scale), to.data(), sumHeight() >> scale, width_ >> scale, tile.x >> scale,
-                (tile.y - sumRows_.begin) >> scale);
-  };
-  take(net_.contextValues().partition, 0, partition_);
-  for (int i = 0; i < kLayerScales; ++i) take(net_.contextValues().kernel[i], i, kernel_[i]);
+  const size_t values = groups() * pixelFloats() * area(from);
+  const auto plan = net_.context().plan(from.height, from.width);
+  for (Light& light : lights_) {
+    Buffer<float> mean(values);
+    cropGroups(reinterpret_cast<const std::byte*>(light.mean.data()), groups(), meanHeight(), width_,
+               pixelFloats() * sizeof(float), {from.x, from.y - meanRows_.begin, from.width, from.height},
+               reinterpret_cast<std::byte*>(mean.data()));
+    Buffer<std::byte> input(values * bytesOf(net_.element()));
+    toElements(mean.data(), values, net_.element(), input.data());
+    mean = {};
+    Buffer<std::byte> arena(plan->layout().bytes);
+    const std::byte* inputs[] = {input.data()};
+    plan->run(inputs, arena.data());
+    const auto take = [&](Value value, int scale, Buffer<std::byte>& to) {
+      pasteGroups(Plan::result(*plan, arena.data(), value), groups(), from.height >> scale, from.width >> scale,
+                  pixelBytes(), scaled(inside, scale), to.data(), sumHeight() >> scale, width_ >> scale,
+                  tile.x >> scale, (tile.y - sumRows_.begin) >> scale);
+    };
+    if (&light == &lights_.front()) take(net_.contextValues().partition, 0, partition_);
+    for (int i = 0; i < kLayerScales; ++i) take(net_.contextValues().kernel[i], i, light.kernel[i]);
+  }
 }
 
 void LayersBand::makeContext(const Progress& progress) {
   const size_t pixels = size_t(sumHeight()) * size_t(width_);
   partition_ = Buffer<std::byte>(groups() * pixelBytes() * pixels, std::byte(0));
-  for (int i = 0; i < kLayerScales; ++i)
-    kernel_[i] = Buffer<std::byte>(groups() * pixelBytes() * (pixels >> 2 * i), std::byte(0));
+  for (Light& light : lights_)
+    for (int i = 0; i < kLayerScales; ++i)
+      light.kernel[i] = Buffer<std::byte>(groups() * pixelBytes() * (pixels >> 2 * i), std::byte(0));
   const std::vector<Window> tiles = tilesOf(sumHeight(), width_, tile_);
   Done done(double(std::max<size_t>(tiles.size(), 1)), progress);
   parallelFor(0, int(tiles.size()), [&](int i) {
@@ -124,11 +132,14 @@ void LayersBand::makeContext(const Progress& progress) {
     contextTile(tile);
     done.add(1);
   });
-  mean_ = {};
-  for (Sums& sums : sums_) {
-    sums.planes = Buffer<float>(kSplatted * pixels, 0.0f);
-    std::fill_n(sums.planes.data() + 4 * pixels, pixels, 1.0f);  // what misses everything passes all layers
-    sums.embedding = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
+  for (Light& light : lights_) {
+    light.mean = {};
+    light.sums.resize(size_t(layers_));
+    for (Sums& sums : light.sums) {
+      sums.planes = Buffer<float>(kSplatted * pixels, 0.0f);
+      std::fill_n(sums.planes.data() + 4 * pixels, pixels, 1.0f);  // what misses everything passes all layers
+      sums.embedding = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
+    }
   }
 }
 
@@ -137,44 +148,54 @@ ContextRow LayersBand::contextRow(int y) const {
   return {partition_.data() + size_t(y - sumRows_.begin) * row, size_t(sumHeight()) * row};
 }
 
-float* LayersBand::sumRow(int layer, size_t plane, int y) {
-  return sums_[size_t(layer)].planes.data() +
+float* LayersBand::sumRow(Light& light, int layer, size_t plane, int y) {
+  return light.sums[size_t(layer)].planes.data() +
          (plane * size_t(sumHeight()) + size_t(y - sumRows_.begin)) * size_t(width_);
 }
 
-void LayersBand::addSums(int y, const SampleRow& row) {
-  const size_t firstPixel = size_t(y - sumRows_.begin) * size_t(width_);
-  const size_t groupFloats = pixelFloats() * size_t(sumHeight()) * size_t(width_);
-  std::vector<float> weight;
-  shareRow(net_, row, contextRow(y), layers(), [&](const SampleChunk& chunk) {
-    const std::vector<uint32_t> pixels = pixelsOf(row, chunk, firstPixel);
-    weight.resize(chunk.count);
-    for (int l = 0; l < layers(); ++l) {
-      const float* share = chunk.shares + size_t(l) * chunk.shareStride;
-      float* planes = sums_[size_t(l)].planes.data();
-      const size_t plane = size_t(sumHeight()) * size_t(width_);
-      for (size_t i = 0; i < chunk.count; ++i) {
-        const size_t s = chunk.begin + i;
-        const float w = weight[i] = row.plane(kWeightInput)[s] * share[i];
-        float* to = planes + pixels[i];
-        for (size_t c = 0; c < 3; ++c) to[c * plane] += w * row.plane(kExposedAt + c)[s];
-        to[3 * plane] += w;
-        to[5 * plane] += w * row.plane(kSampleDepth)[s];
-      }
-      addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), weight.data(), pixels.data(),
-                  chunk.count, sums_[size_t(l)].embedding.data(), groupFloats);
+void LayersBand::addChunk(Light& light, int y, const SampleRow& row, const SampleChunk& chunk, const float* shares,
+                          size_t stride) {
+  const std::vector<uint32_t> pixels = pixelsOf(row, chunk, size_t(y - sumRows_.begin) * size_t(width_));
+  const size_t plane = size_t(sumHeight()) * size_t(width_);
+  std::vector<float> weight(chunk.count);
+  for (int l = 0; l < layers_; ++l) {
+    float* planes = light.sums[size_t(l)].planes.data();
+    for (size_t i = 0; i < chunk.count; ++i) {
+      const size_t s = chunk.begin + i;
+      const float w = weight[i] = row.plane(kWeightInput)[s] * shares[size_t(l) * stride + i];
+      float* to = planes + pixels[i];
+      for (size_t c = 0; c < 3; ++c) to[c * plane] += w * row.exposed(light.light, c, s);
+      to[3 * plane] += w;
+      to[5 * plane] += w * row.plane(kSampleDepth)[s];
     }
+    addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), weight.data(), pixels.data(),
+                chunk.count, light.sums[size_t(l)].embedding.data(), pixelFloats() * plane);
+  }
+}
+
+void LayersBand::addSums(int y, const SampleRow& row) {
+  const bool several = lights_.size() > 1;
+  Buffer<float> kept(several ? size_t(layers_) * row.count() : 0);
+  Light& first = lights_.front();
+  shareRow(net_, row, first.light, contextRow(y), layers_, [&](const SampleChunk& chunk) {
+    addChunk(first, y, row, chunk, chunk.shares, chunk.shareStride);
+    for (size_t l = 0; several && l < size_t(layers_); ++l)
+      std::copy_n(chunk.shares + l * chunk.shareStride, chunk.count, kept.data() + l * row.count() + chunk.begin);
   });
-  finishOccupancy(y);
+  if (several)
+    embedRow(net_, row, lights_[1].light, [&](const SampleChunk& chunk) {
+      addChunk(lights_[1], y, row, chunk, kept.data() + chunk.begin, row.count());
+    });
+  for (Light& light : lights_) finishOccupancy(light, y);
 }
 
 // What reaches a layer: all but what the layers before it hold, summed from behind, so that it is never less than its own.
-void LayersBand::finishOccupancy(int y) {
+void LayersBand::finishOccupancy(Light& light, int y) {
   for (int x = 0; x < width_; ++x) {
     float all = 0;
-    for (int l = 0; l < layers(); ++l) all += sumRow(l, 3, y)[x];
+    for (int l = 0; l < layers_; ++l) all += sumRow(light, l, 3, y)[x];
     float reaching = std::max(0.0f, 1 - all);
-    for (int l = layers(); l-- > 0;) sumRow(l, 4, y)[x] = reaching += sumRow(l, 3, y)[x];
+    for (int l = layers_; l-- > 0;) sumRow(light, l, 4, y)[x] = reaching += sumRow(light, l, 3, y)[x];
   }
 }
 
@@ -185,26 +206,38 @@ class LayersBand::TileFilter {
 
   // False where there is nothing in the layer.
   bool run(int layer) {
-    tile_ = band_.near(whole_, net_.filterHalo(), [&](int x, int y) { return band_.sumRow(layer, 3, y)[x] != 0; });
+    tile_ = band_.near(whole_, net_.filterHalo(),
+                       [&](int x, int y) { return band_.sumRow(band_.lights_.front(), layer, 3, y)[x] != 0; });
     if (area(tile_) == 0) return false;
     from_ = grown(tile_, net_.filterHalo(), band_.height_, band_.width_);
-    shrink(layer);
-    for (int i = 0; i < kLayerScales; ++i) filter(i);
-    join();
-    float* to = band_.results_[size_t(layer)].data();
-    const size_t rows = size_t(band_.rows_.end - band_.rows_.begin);
-    for (size_t p = 0; p < kLayerPlanes; ++p)
-      for (int y = tile_.y; y < tile_.y + tile_.height; ++y)
-        std::copy_n(joined_.row(p, y - from_.y) + tile_.x - from_.x, tile_.width,
-                    to + (p * rows + size_t(y - band_.rows_.begin)) * size_t(band_.width_) + tile_.x);
+    for (Light& light : band_.lights_) {
+      shrink(light, layer);
+      for (int i = 0; i < kLayerScales; ++i) filter(light, i);
+      join();
+      addToResult(layer);
+    }
     return true;
   }
 
  private:
   Window insideBand() const { return {from_.x, from_.y - band_.sumRows_.begin, from_.width, from_.height}; }
 
+  // Colours as they are, what covers and how far away that is by the number of lights.
+  void addToResult(int layer) const {
+    float* result = band_.results_[size_t(layer)].data();
+    const size_t rows = size_t(band_.rows_.end - band_.rows_.begin);
+    for (size_t p = 0; p < kLayerPlanes; ++p) {
+      const float part = p < 3 ? 1.0f : 1.0f / float(band_.lights_.size());
+      for (int y = tile_.y; y < tile_.y + tile_.height; ++y) {
+        const float* from = joined_.row(p, y - from_.y) + tile_.x - from_.x;
+        float* to = result + (p * rows + size_t(y - band_.rows_.begin)) * size_t(band_.width_) + tile_.x;
+        for (int x = 0; x < tile_.width; ++x) to[x] += part * from[x];
+      }
+    }
+  }
+
   // What is splatted, and embeddings, at all scales.
-  void shrink(int layer) {
+  void shrink(Light& light, int layer) {
     const int groups = int(band_.groups()), block = net_.block();
     for (int i = 0; i < kLayerScales; ++i) {
       const int height = from_.height >> i, width = from_.width >> i;
@@ -213,8 +246,8 @@ class LayersBand::TileFilter {
       if (i == 0) {
         for (size_t p = 0; p < kSplatted; ++p)
           for (int y = 0; y < height; ++y)
-            std::copy_n(band_.sumRow(layer, p, from_.y + y) + from_.x, width, values_[0].row(p, y));
-        cropGroups(reinterpret_cast<const std::byte*>(band_.sums_[size_t(layer)].embedding.data()), size_t(groups),
+            std::copy_n(band_.sumRow(light, layer, p, from_.y + y) + from_.x, width, values_[0].row(p, y));
+        cropGroups(reinterpret_cast<const std::byte*>(light.sums[size_t(layer)].embedding.data()), size_t(groups),
                    band_.sumHeight(), band_.width_, size_t(block) * sizeof(float), insideBand(),
                    reinterpret_cast<std::byte*>(embedding_[0].data()));
       } else {
@@ -225,13 +258,13 @@ class LayersBand::TileFilter {
     }
   }
 
-  void filter(int i) {
+  void filter(const Light& light, int i) {
     const int height = from_.height >> i, width = from_.width >> i;
     const auto plan = net_.kernel(i).plan(height, width);
     Buffer<std::byte> arena(plan->layout().bytes), input(embedding_[i].size() * bytesOf(net_.element())),
         context(input.size());
     toElements(embedding_[i].data(), embedding_[i].size(), net_.element(), input.data());
-    cropGroups(band_.kernel_[i].data(), band_.groups(), band_.sumHeight() >> i, band_.width_ >> i, band_.pixelBytes(),
+    cropGroups(light.kernel[i].data(), band_.groups(), band_.sumHeight() >> i, band_.width_ >> i, band_.pixelBytes(),
                scaled(insideBand(), i), context.data());
     const std::byte* inputs[] = {input.data(), context.data()};
     plan->run(inputs, arena.data());
@@ -287,7 +320,7 @@ const float* LayersBand::row(int layer, size_t plane, int y) const {
 
 Buffer<float> LayersBand::shares(int y, const SampleRow& row) const {
   Buffer<float> result(size_t(layers()) * row.count());
-  shareRow(net_, row, contextRow(y), layers(), [&](const SampleChunk& chunk) {
+  shareRow(net_, row, lights_.front().light, contextRow(y), layers(), [&](const SampleChunk& chunk) {
     for (int l = 0; l < layers(); ++l)
       std::copy_n(chunk.shares + size_t(l) * chunk.shareStride, chunk.count,
                   result.data() + size_t(l) * row.count() + chunk.begin);

@@ -18,13 +18,15 @@ namespace fathom::nn {
 class LayersBand {
  public:
   // Rows [rows.begin, rows.end) of a frame of height x width, all multiples of LayersNet::kAlignment; `layers` is 1, 2 or 4;
-  // tiles have at most `tile` pixels a side. The net must outlive this.
-  LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int tile);
+  // tiles have at most `tile` pixels a side. With two lights the diffuse and the specular one go through the network apart,
+  // in the layers that the diffuse one makes: their colours are added, and what a layer covers is the mean. The net must
+  // outlive this.
+  LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int lights, int tile);
 
   const Interval& rows() const { return rows_; }
   const Interval& meanRows() const { return meanRows_; }
   const Interval& sumRows() const { return sumRows_; }
-  int layers() const { return int(sums_.size()); }
+  int layers() const { return layers_; }
 
   // Different rows may be added from many threads at once. A row may have fewer pixels than the frame.
   void addMeans(int y, const SampleRow& row);
@@ -45,6 +47,12 @@ class LayersBand {
   struct Sums {
     Buffer<float> planes, embedding;  // [kSplatted][rows][width], [groups][rows][width][block]
   };
+  struct Light {
+    SampleLight light = SampleLight::Both;
+    Buffer<float> mean;                      // [groups][mean rows][width][block]
+    Buffer<std::byte> kernel[kLayerScales];  // contexts, [groups][sum rows >> scale][width >> scale][block]
+    std::vector<Sums> sums;                  // of each layer
+  };
 
   class TileFilter;
 
@@ -54,24 +62,23 @@ class LayersBand {
   int sumHeight() const { return sumRows_.end - sumRows_.begin; }
   int meanHeight() const { return meanRows_.end - meanRows_.begin; }
   ContextRow contextRow(int y) const;
-  float* sumRow(int layer, size_t plane, int y);
-  const float* sumRow(int layer, size_t plane, int y) const {
-    return const_cast<LayersBand*>(this)->sumRow(layer, plane, y);
-  }
+  float* sumRow(Light& light, int layer, size_t plane, int y);
   // Of a tile, what lies within `reach` of anything that `there` tells of, at multiples of kAlignment.
   template <class There>
   Window near(const Window& tile, int reach, const There& there) const;
   void contextTile(const Window& tile);
-  void finishOccupancy(int y);
+  // A chunk of row y into all layers, `shares` apart by `stride`.
+  void addChunk(Light& light, int y, const SampleRow& row, const SampleChunk& chunk, const float* shares,
+                size_t stride);
+  void finishOccupancy(Light& light, int y);
 
   const LayersNet& net_;
-  int height_, width_, tile_;
+  int height_, width_, layers_, tile_;
   Interval rows_, sumRows_, meanRows_;
-  Buffer<float> mean_;                                  // [groups][mean rows][width][block]
-  Buffer<uint8_t> occupied_;                            // [mean rows][width]
-  Buffer<std::byte> partition_, kernel_[kLayerScales];  // contexts, [groups][sum rows >> scale][width >> scale][block]
-  std::vector<Sums> sums_;                              // of each layer
-  std::vector<Buffer<float>> results_;                  // of each layer, [kLayerPlanes][rows][width]
+  Buffer<uint8_t> occupied_;     // [mean rows][width]
+  Buffer<std::byte> partition_;  // as contexts are, of the first light
+  std::vector<Light> lights_;
+  std::vector<Buffer<float>> results_;  // of each layer, [kLayerPlanes][rows][width]
   size_t filtered_ = 0, skipped_ = 0;
 };
 

@@ -27,12 +27,19 @@ size_t groupsOf(int channels, int block) {
   return size_t((channels + block - 1) / block);
 }
 
-// The inputs of samples, filled up with zeros to `size`, as the networks take them.
-const std::byte* pack(const LayersNet& net, const SampleRow& row, size_t begin, size_t count, size_t size,
-                      Scratch& scratch) {
+// Whether an input tells of a light, or of all alike: inputs 0 to 2 are the diffuse light and 17 its deviation, 3 to 5 and
+// 18 the specular light's.
+bool belongs(size_t input, SampleLight light) {
+  const bool diffuse = input < 3 || input == 17, specular = (input >= 3 && input < 6) || input == 18;
+  return light == SampleLight::Both || !(light == SampleLight::Diffuse ? specular : diffuse);
+}
+
+// The inputs of samples with one light, filled up with zeros to `size`, as the networks take them.
+const std::byte* pack(const LayersNet& net, const SampleRow& row, SampleLight light, size_t begin, size_t count,
+                      size_t size, Scratch& scratch) {
   for (size_t p = 0; p < kSampleInputs; ++p) {
     float* to = scratch.planes.data() + p * size;
-    std::fill(std::copy_n(row.plane(p) + begin, count, to), to + size, 0.0f);
+    std::fill(belongs(p, light) ? std::copy_n(row.plane(p) + begin, count, to) : to, to + size, 0.0f);
   }
   const size_t values = groupsOf(kSampleInputs, net.block()) * size_t(net.block()) * size;
   std::byte* packed = scratch.room(scratch.packed, values * bytesOf(net.element()));
@@ -66,10 +73,10 @@ void forChunks(const SampleRow& row, const Body& body) {
 
 }  // namespace
 
-void embedRow(const LayersNet& net, const SampleRow& row, const ChunkBody& body) {
+void embedRow(const LayersNet& net, const SampleRow& row, SampleLight light, const ChunkBody& body) {
   Scratch scratch;
   forChunks(row, [&](size_t begin, size_t count, size_t size) {
-    const std::byte* inputs[] = {pack(net, row, begin, count, size, scratch)};
+    const std::byte* inputs[] = {pack(net, row, light, begin, count, size, scratch)};
     const auto plan = net.embed().plan(1, int(size));
     std::byte* arena = scratch.room(scratch.arena, plan->layout().bytes);
     plan->run(inputs, arena);
@@ -78,12 +85,12 @@ void embedRow(const LayersNet& net, const SampleRow& row, const ChunkBody& body)
   });
 }
 
-void shareRow(const LayersNet& net, const SampleRow& row, const ContextRow& context, int layers,
+void shareRow(const LayersNet& net, const SampleRow& row, SampleLight light, const ContextRow& context, int layers,
               const ChunkBody& body) {
   Scratch scratch;
   scratch.shares = Buffer<float>(size_t(layers) * kShareStride, 1.0f);
   if (layers == 1) {
-    embedRow(net, row, [&](SampleChunk chunk) {
+    embedRow(net, row, light, [&](SampleChunk chunk) {
       chunk.shares = scratch.shares.data();
       body(chunk);
     });
@@ -92,7 +99,7 @@ void shareRow(const LayersNet& net, const SampleRow& row, const ContextRow& cont
   const size_t groups = groupsOf(kEmbedding, net.block());
   scratch.embedding = Buffer<float>(groups * size_t(net.block()) * kChunk);
   forChunks(row, [&](size_t begin, size_t count, size_t size) {
-    const std::byte* inputs[] = {pack(net, row, begin, count, size, scratch),
+    const std::byte* inputs[] = {pack(net, row, light, begin, count, size, scratch),
                                  gather(net, row, context, begin, count, size, scratch)};
     const auto plan = net.partition().plan(1, int(size));
     std::byte* arena = scratch.room(scratch.arena, plan->layout().bytes);

@@ -25,8 +25,9 @@ struct ContextRow {
   size_t groupBytes = 0;
 };
 
-void embedRow(const LayersNet& net, const SampleRow& row, const ChunkBody& body);
+void embedRow(const LayersNet& net, const SampleRow& row, SampleLight light, const ChunkBody& body);
 // With the parts of each sample in `layers` layers.
-void shareRow(const LayersNet& net, const SampleRow& row, const ContextRow& context, int layers, const ChunkBody& body);
+void shareRow(const LayersNet& net, const SampleRow& row, SampleLight light, const ContextRow& context, int layers,
+              const ChunkBody& body);
 
 }  // namespace fathom::nn

@@ -24,7 +24,7 @@ import samples
 from clusters import gathered, labels
 from evaluate import relmse
 from exr import read
-from layers_model import LAYERS, Layered, assembled
+from layers_model import LAYERS, Layered, assembled, together
 from planes import component, triple
 from weights import load_model
 
@@ -66,10 +66,12 @@ def subject(pair, forms=FORMS):
 
 
 def network_result(model, frame, form, layers):
-    deep = frame.forms[form]
-    parts = samples.listed(deep, frame.exposure, frame.depth)
-    with torch.no_grad():
-        return model.result(assembled([parts], samples.padded(deep.shape)), layers)
+    results = []
+    for deep in samples.lights_apart(frame.forms[form]):
+        parts = samples.listed(deep, frame.exposure, frame.depth)
+        with torch.no_grad():
+            results.append(model.result(assembled([parts], samples.padded(deep.shape)), layers, results[0].partition if results else None))
+    return together(results)
 
 
 def fronts(model, frame):

@@ -8,10 +8,11 @@ one and with many, and some whose alphas do not add up to 1. OUT's tensors, S sa
   counts (height, width): samples of each pixel
   A, Z, coc, lens.U, ..., diffuse.R, ...  (S): channels as in a deep file, premultiplied
   exposure, depth (1): the scale of the light, and the mean depth
-  inputs (S, 20), weight (S), light (S, 3): what the network reads of them; light times the exposure, not premultiplied
+  inputs (S, 20), weight (S), light (S, 6): what the network reads of them; light, diffuse and specular, times the exposure, not premultiplied
   sample_inputs (S, 20): the same without variance.* and samples, of SPP camera samples per pixel
   partition{L} (S, L); radiance{L} (L, 3, height, width), opacity{L} and depth{L} (L, height, width): of the layers, premultiplied
-  colour{L} (3, height, width), alpha{L} (height, width): the result. L is 1, 2 and 4; all light is times the exposure.
+  colour{L} (3, height, width), alpha{L} (height, width): the result. L is 1, 2 and 4; all light is times the exposure. The lights
+  are denoised apart.
 """
 
 import argparse
@@ -21,7 +22,7 @@ import numpy as np
 import torch
 
 import samples
-from layers_model import LAYERS, Layered, assembled
+from layers_model import LAYERS, Layered, assembled, together
 from weights import load_model, save_model, write_tensors
 
 MOST = 9  # samples of a pixel
@@ -57,14 +58,15 @@ def golden(model, width, height, seed=7):
     counts, channels = random_frame(np.random.default_rng(seed), width, height)
     deep = samples.measure(counts, channels)
     scale, depth = samples.exposure_of(deep), samples.mean_depth(deep)
-    frame = assembled([samples.listed(deep, scale, depth)], samples.padded(deep.shape))
+    frame, *lights = (assembled([samples.listed(x, scale, depth)], samples.padded(deep.shape)) for x in (deep, *samples.lights_apart(deep)))
     tensors = {"counts": counts, "exposure": [scale], "depth": [depth], **channels}
-    tensors.update(inputs=frame.inputs.numpy(), weight=frame.weight.numpy(), light=frame.light.numpy())
+    tensors.update(inputs=frame.inputs.numpy(), weight=frame.weight.numpy(), light=np.concatenate([x.light.numpy() for x in lights], 1))
     plain = {name: x for name, x in channels.items() if name != "samples" and not name.startswith("variance.")}
     tensors["sample_inputs"] = samples.listed(samples.measure(counts, plain, SPP), scale, depth)[0]
     for k in LAYERS:
         with torch.no_grad():
-            result = model.result(frame, k)
+            first = model.result(lights[0], k)
+            result = together([first, model.result(lights[1], k, first.partition)])
         tensors[f"partition{k}"] = result.partition.numpy()
         crop = {"radiance": result.radiance[:, 0], "opacity": result.opacity[:, 0, 0], "depth": result.depth[:, 0, 0]}
         crop.update(colour=result.colour[0], alpha=result.alpha[0, 0])

@@ -3,9 +3,10 @@
 import numpy as np
 
 import augment
-from augment import PATTERNED, STOPS, TURNED, drawn_pattern
+from augment import FAINT, PATTERNED, SHARES, STOPS, drawn_pattern
 from clusters import PHYSICAL, chosen, gathered, labels
 from layers_model import assembled
+from planes import LIGHTS
 from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, inputs, light_of, pixel_deviations
 
 # Raw camera samples; bins of them; all of a pixel in one, which is what a network on pixels sees.
@@ -77,15 +78,29 @@ def turned(random, samples, targets):
     samples, targets = result
     for name in ("diffuse", "specular", "albedo"):
         samples[..., WHERE[name]] = samples[..., WHERE[name]][..., colours]
-    targets[..., :3] = targets[..., :3][..., colours]
+    for k in range(len(LIGHTS)):
+        targets[..., 3 * k : 3 * k + 3] = targets[..., 3 * k + colours]
     samples[..., WHERE["normal"]] = samples[..., WHERE["normal"]][..., axes] * signs
     samples[..., WHERE["lens"]] = turned_lens(samples[..., WHERE["lens"]], flips, transposed)
     return samples, targets
 
 
+def with_one_light(random, samples, targets):
+    """The crop with its diffuse or its specular light alone, or with both; and targets (height, width, 5): of that light, alpha, counts."""
+    means = dict(zip(LIGHTS, targets[..., : 3 * len(LIGHTS)].reshape(-1, len(LIGHTS), 3).mean((0, 2))))
+    names = [name for name in LIGHTS if name == "rgb" or means[name] > FAINT * means["rgb"]]
+    shares = np.array([SHARES[name] for name in names])
+    light = names[random.choice(len(names), p=shares / shares.sum())]
+    for name in LIGHTS[1:]:
+        if light not in ("rgb", name):
+            samples[..., WHERE[name]] = 0
+    first = 3 * LIGHTS.index(light)
+    return samples, np.concatenate([targets[..., first : first + 3], targets[..., -2:]], -1)
+
+
 def varied(random, frame, samples, targets):
     """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 5), light times the exposure."""
-    samples, targets = turned(random, samples, targets)
+    samples, targets = with_one_light(random, *turned(random, samples, targets))
     if random.random() < PATTERNED:
         pattern = drawn_pattern(random, *targets.shape[:2])[0][:, :, None]
         samples[..., :6] *= pattern[..., None]

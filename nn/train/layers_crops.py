@@ -1,8 +1,8 @@
 """A cache of camera samples, and crops from it.
 
 As `crops.py`, of files of samples: NAME.npy, float32 (height, width, n), has the samples of a pixel behind one another, front to back, in the
-first columns of samples.py (depth 0: none), and behind them the reference's light, alpha, and whether these count: samples know nothing of
-an environment that is seen where nothing was hit.
+first columns of samples.py (depth 0: none), and behind them the reference's light of all LIGHTS (as much as it has), alpha, and whether these
+count: samples know nothing of an environment that is seen where nothing was hit.
 """
 
 import numpy as np
@@ -12,10 +12,10 @@ import frames
 import samples
 from clusters import PHYSICAL
 from exr import read, read_deep
-from planes import component
+from planes import LIGHTS, component
 
-VERSION = 1
-TARGETS = 5  # light, alpha, counts
+VERSION = 2
+TARGETS = 3 * len(LIGHTS) + 2  # lights, alpha, counts
 SEVERAL = 0.3  # interest of a pixel that sees more than one depth
 APART = 1.03  # ratio of depths that counts as two
 HELD_FRAMES = ("staircase2",)  # the shared render of a scene that others are trained on
@@ -71,10 +71,13 @@ def prepare(pair, size):
     interest = np.minimum(scale * np.abs(noisy - light).mean(0) / (exposed.mean(0) + 0.05), 1)
     interest += np.minimum(crops.edges(np.log1p(exposed)), 0.5) + SEVERAL * several(stack[..., samples.WHERE["depth"].start])
     probabilities = crops.acceptance(interest * counts, size)
-    pixels = np.concatenate([stack.reshape(*deep.shape, -1), light.transpose(1, 2, 0), alpha[..., None], counts[..., None]], 2)
+    parts = [component(reference, name) for name in LIGHTS[1:]]
+    apart = all(x is not None for x in parts)
+    lights = np.concatenate([light, *(parts if apart else 2 * [np.zeros_like(light)])]).transpose(1, 2, 0)
+    pixels = np.concatenate([stack.reshape(*deep.shape, -1), lights, alpha[..., None], counts[..., None]], 2)
     description = {
         "version": VERSION, "name": pair.name, "scene": pair.scene, "spp": spp, "exposure": scale, "depth": samples.mean_depth(deep),
-        "scale": float(attributes["fathom:ppuScale"]), "given": sorted(deep.given), "size": size, "acceptance": probabilities.round(3).tolist(),
+        "scale": float(attributes["fathom:ppuScale"]), "given": sorted(deep.given), "apart": apart, "size": size, "acceptance": probabilities.round(3).tolist(),
     }  # fmt: skip
     return pixels.astype(np.float32), description
 
@@ -83,6 +86,7 @@ class Frame(crops.Frame):
     def __init__(self, path, description):
         super().__init__(path, description)
         self.spp, self.depth, self.scale = description["spp"], description["depth"], description["scale"]
+        self.apart = description["apart"]  # whether the reference has diffuse and specular light
         self.sides = self.pixels.shape[:2]
 
     def crop(self, y, x, size):

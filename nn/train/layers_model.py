@@ -6,7 +6,8 @@ frame taken off; the scales of a layer are joined before compositing, so that la
 what misses everything passes all layers; partitions below FLOOR are none, so that layers can be empty.
 
 Samples are a ragged list: `pixel` says for each of S samples in which of frames * height * width pixels it lies. Sides are multiples of
-4. A layer's kernels depend on the layer by its embeddings alone: the same weights serve 1, 2 and 4 layers.
+4. A layer's kernels depend on the layer by its embeddings alone: the same weights serve 1, 2 and 4 layers. Diffuse and specular light are filtered
+apart, with their own kernels, in the layers that the samples were put in with the diffuse light (`together`).
 
 The names of the layers are the interface to the C++ side: `state_dict()` and the weight file have the same names.
 """
@@ -170,7 +171,8 @@ class Layered(nn.Module):
         opacity = (spread[:, 3:4] / occupancy).clamp(max=1)
         return torch.cat([spread[:, :3] / occupancy, opacity, spread[:, 5:] / occupancy], 1), logits
 
-    def result(self, samples, layers):
+    def result(self, samples, layers, partition=None):
+        """partition: what another light of the same samples had, where that is to be kept."""
         if layers not in LAYERS:
             raise ValueError(f"layers: expected one of {LAYERS}, found {layers}")
         frames, height, width = samples.shape
@@ -183,7 +185,8 @@ class Layered(nn.Module):
         weight = samples.weight[:, None]
         embedding = self.embedded(samples)
         scales = self.unet.scales(summed(weight * embedding))
-        partition = self.shares(rows_of(scales[0]), embedding, samples.pixel, layers)
+        if partition is None:
+            partition = self.shares(rows_of(scales[0]), embedding, samples.pixel, layers)
         # Light, weight and depth, then the embedding: what a sample gives to a layer, for its share.
         given = torch.cat([samples.light, torch.ones_like(weight), samples.depth[:, None], embedding], 1)
         sums = [summed(weight * partition[:, k : k + 1] * given) for k in range(layers)]
@@ -213,6 +216,14 @@ class Layered(nn.Module):
         """Radiance, opacity and depth, (layers, frames, ...), of what has the layers behind one another."""
         x = filtered.reshape(layers, -1, *filtered.shape[1:])
         return x[:, :, :3], x[:, :, 3:4], x[:, :, 4:5]
+
+
+def together(results):
+    """Of lights that were filtered apart with one partition: colours add up, what a layer covers is the mean."""
+    opacity, depth = (sum(getattr(x, name) for x in results) / len(results) for name in ("opacity", "depth"))
+    radiance = sum(x.radiance for x in results)
+    colour, alpha = composited(radiance, opacity)
+    return results[0]._replace(colour=colour, alpha=alpha, radiance=radiance, opacity=opacity, depth=depth)
 
 
 def gigaflops_per_megapixel(width, layers, samples):

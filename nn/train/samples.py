@@ -114,6 +114,22 @@ def light_of(values):
     return values[:, WHERE["diffuse"]] + values[:, WHERE["specular"]]
 
 
+def alone(values, light):
+    """A list with one of LIGHTS[1:] as all of its light, in place."""
+    for k, name in enumerate(LIGHTS[1:]):
+        if name != light:
+            values[:, WHERE[name]] = 0
+            values[:, WHERE["noise"].start + k] = 0
+    return values
+
+
+def lights_apart(deep):
+    """What the network denoises one after the other: the diffuse and the specular light of a list; all of it at once where it has one kind."""
+    if not all(deep.values[:, WHERE[name]].any() for name in LIGHTS[1:]):
+        return [deep]
+    return [deep._replace(values=alone(deep.values.copy(), name)) for name in LIGHTS[1:]]
+
+
 def flattened(deep, columns):
     """The weighted sums of (S, n) per pixel, (n, height, width)."""
     size = deep.shape[0] * deep.shape[1]

@@ -19,7 +19,7 @@ using nn::LayersNet;
 using nn::Precision;
 
 constexpr int kSide = 512, kSamples = 8, kTile = 256, kRepeats = 3;
-constexpr int kLayers[] = {1, 2, 4};
+constexpr int kLayers[] = {1, 2, 4}, kLights[] = {1, 2};
 
 // Camera samples: all weigh the same.
 nn::SampleRow randomRow(uint32_t seed) {
@@ -33,8 +33,8 @@ nn::SampleRow randomRow(uint32_t seed) {
 }
 
 // Runs one frame; seconds of its four steps are added to `steps`.
-void runFrame(const LayersNet& net, const std::vector<nn::SampleRow>& rows, int layers, double* steps) {
-  LayersBand band(net, kSide, kSide, {0, kSide}, layers, kTile);
+void runFrame(const LayersNet& net, const std::vector<nn::SampleRow>& rows, int layers, int lights, double* steps) {
+  LayersBand band(net, kSide, kSide, {0, kSide}, layers, lights, kTile);
   const std::vector<std::function<void()>> parts = {
       [&] { parallelFor(0, kSide, [&](int y) { band.addMeans(y, rows[size_t(y)]); }); }, [&] { band.makeContext(); },
       [&] { parallelFor(0, kSide, [&](int y) { band.addSums(y, rows[size_t(y)]); }); }, [&] { band.filter(); }};
@@ -46,10 +46,10 @@ void runFrame(const LayersNet& net, const std::vector<nn::SampleRow>& rows, int 
 }
 
 Table costs(const std::vector<nn::SampleRow>& rows) {
-  Table table(
-      fmt::format("Layered network, {0}x{0} pixels of {1} samples in tiles of {2}, {3} threads", kSide, kSamples, kTile,
-                  tbb::this_task_arena::max_concurrency()),
-      {"width", "layers", "s/MP", "means", "context", "sums", "filter", "GFLOP/MP", "GFLOP/s", "bytes per pixel"});
+  Table table(fmt::format("Layered network, {0}x{0} pixels of {1} samples in tiles of {2}, {3} threads", kSide,
+                          kSamples, kTile, tbb::this_task_arena::max_concurrency()),
+              {"width", "layers", "lights", "s/MP", "means", "context", "sums", "filter", "GFLOP/MP", "GFLOP/s",
+               "bytes per pixel"});
   const double megapixels = kSide * kSide * 1e-6;
   std::vector<std::pair<int, Precision>> settings = {{16, Precision::float32}, {32, Precision::float32}};
   if (nn::machineHasBfloat16()) settings.emplace_back(32, Precision::bfloat16);
@@ -57,17 +57,18 @@ Table costs(const std::vector<nn::SampleRow>& rows) {
     const auto bytes = reference::safetensors(reference::randomLayered(width, 1));
     const LayersNet net(nn::readWeights(bytes, "random"), precision);
     const std::string name = fmt::format("{}, {}", width, precision == Precision::float32 ? "float32" : "bfloat16");
-    for (const int layers : kLayers) {
-      double steps[4] = {};
-      runFrame(net, rows, layers, steps);  // plans are made, memory is touched
-      std::fill_n(steps, 4, 0.0);
-      for (int i = 0; i < kRepeats; ++i) runFrame(net, rows, layers, steps);
-      double seconds = 0;
-      for (double& step : steps) seconds += step /= kRepeats * megapixels;
-      const double gflop = net.flopPerPixel(kSamples, layers) * 1e-3;
-      table.add({name, double(layers), seconds, steps[0], steps[1], steps[2], steps[3], gflop, gflop / seconds,
-                 net.bandBytes(layers)});
-    }
+    for (const int layers : kLayers)
+      for (const int lights : kLights) {
+        double steps[4] = {};
+        runFrame(net, rows, layers, lights, steps);  // plans are made, memory is touched
+        std::fill_n(steps, 4, 0.0);
+        for (int i = 0; i < kRepeats; ++i) runFrame(net, rows, layers, lights, steps);
+        double seconds = 0;
+        for (double& step : steps) seconds += step /= kRepeats * megapixels;
+        const double gflop = net.flopPerPixel(kSamples, layers, lights) * 1e-3;
+        table.add({name, double(layers), double(lights), seconds, steps[0], steps[1], steps[2], steps[3], gflop,
+                   gflop / seconds, net.bandBytes(layers, lights)});
+      }
   }
   return table;
 }

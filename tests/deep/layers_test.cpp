@@ -185,7 +185,10 @@ TEST(Layers, RowsKnowTheBrightnessOfTheRenderAndOfTheResult) {
 TEST(Layers, MemoryDoesNotChangeTheResult) {
   const DeepImage image = reference::makeNoisyFrame(44, 203, 1);
   const nn::LayersNet net = randomNet();
-  const size_t least = leastLayersBytes(net, 2, image.dataWindow);
+  const LayerScale scale = measureLayers(layerSource(image), {});
+  ASSERT_EQ(scale.lights, 2);
+  const size_t least = leastLayersBytes(net, 2, scale.lights, image.dataWindow);
+  EXPECT_LT(leastLayersBytes(net, 2, 1, image.dataWindow), least);
   size_t one = 0, few = 0, many = 0;
   const flat::Image expected = banded(image, {}, one);
   expectNear(banded(image, {.memory = least + least / 8}, few), expected, 1e-5f);
@@ -193,8 +196,8 @@ TEST(Layers, MemoryDoesNotChangeTheResult) {
   EXPECT_EQ(one, 1U);
   EXPECT_GT(few, 1U);
   EXPECT_GT(many, few);
-  EXPECT_EQ(layersBands(net, {.memory = least}, image.dataWindow).size(), many);
-  EXPECT_LE(least, mostLayersBytes(net, 2, image.dataWindow));
+  EXPECT_EQ(layersBands(net, {.memory = least}, scale, image.dataWindow).size(), many);
+  EXPECT_LE(least, mostLayersBytes(net, 2, scale.lights, image.dataWindow));
   EXPECT_THROW(banded(image, {.memory = least / 2}, few), Error);
 }
 
@@ -317,8 +320,25 @@ TEST(LayerSamples, TakeWhatThereIs) {
   EXPECT_EQ(at(16, 1), 0.75f);
   EXPECT_EQ(at(17, 1), 0);
   EXPECT_NEAR(at(19, 1), 1 / 8.0, 1e-6);
-  EXPECT_EQ(at(nn::kExposedAt + 2, 0), 6);
+  EXPECT_EQ(at(nn::kExposedAt + 3 + 2, 0), 6) << "as specular light";
+  EXPECT_EQ(at(nn::kExposedAt + 2, 0), 0);
+  EXPECT_EQ(scale.lights, 1);
   EXPECT_EQ(at(nn::kSampleDepth, 2), 4);
+}
+
+TEST(LayerSamples, TellWhetherThereAreTwoLights) {
+  DeepImage image = reference::makeNoisyFrame(12, 9, 1);
+  EXPECT_EQ(measureLayers(layerSource(image), {}).lights, 2);
+  const std::span<const float> alpha = image.get("A");
+  for (const char* c : {"R", "G", "B"}) {
+    const std::span<float> specular = image.get(std::string("specular.") + c);
+    for (size_t s = 0; s < specular.size(); ++s)
+      if (alpha[s] > 0) specular[s] = 0;
+  }
+  EXPECT_EQ(measureLayers(layerSource(image), {}).lights, 1);
+  const auto seen = size_t(std::ranges::find_if(alpha, [](float a) { return a > 0; }) - alpha.begin());
+  image.get("specular.G")[seen] = 1e-30f;
+  EXPECT_EQ(measureLayers(layerSource(image), {}).lights, 2);
 }
 
 TEST(LayerSamples, OddValues) {
@@ -335,7 +355,7 @@ TEST(LayerSamples, OddValues) {
   const auto at = [&](size_t plane, size_t sample) { return row.samples.plane(plane)[sample]; };
   EXPECT_EQ(row.emissionDepth[0], 1) << "of the first that shines";
   EXPECT_EQ(at(3, 0), 0) << "negative light";
-  EXPECT_EQ(at(nn::kExposedAt, 0), -8);
+  EXPECT_EQ(at(nn::kExposedAt + 3, 0), -8);
   EXPECT_EQ(at(12, 0), 0) << "behind the camera";
   EXPECT_EQ(at(13, 0), -12.0f / 16);
   EXPECT_EQ(at(14, 0), -1);
@@ -369,6 +389,7 @@ TEST(LayerSamples, EqualsItsTraining) {
       image.channels.push_back({name, PixelType::Float, tensor.values.copy(), {}});
   const LayerSource source = layerSource(image);
   const LayerScale scale = measureLayers(source, {});
+  EXPECT_EQ(scale.lights, 2);
   EXPECT_NEAR(scale.exposure / values("exposure")[0], 1, 1e-5);
   EXPECT_NEAR(scale.depth / values("depth")[0], 1, 1e-5);
   size_t next = 0;
@@ -377,8 +398,8 @@ TEST(LayerSamples, EqualsItsTraining) {
     for (size_t s = 0; s < row.samples.count(); ++s, ++next) {
       for (size_t p = 0; p < nn::kSampleInputs; ++p)
         ASSERT_NEAR(row.samples.plane(p)[s], values("inputs")[next * nn::kSampleInputs + p], 1e-5) << p << ", " << next;
-      for (size_t c = 0; c < 3; ++c)
-        ASSERT_NEAR(row.samples.plane(nn::kExposedAt + c)[s], values("light")[next * 3 + c], 1e-4) << next;
+      for (size_t c = 0; c < 6; ++c)
+        ASSERT_NEAR(row.samples.plane(nn::kExposedAt + c)[s], values("light")[next * 6 + c], 1e-4) << next;
     }
   }
   EXPECT_EQ(next, image.samples());

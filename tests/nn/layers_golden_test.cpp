@@ -20,7 +20,7 @@ SampleRow rowOf(const WeightFile& golden, size_t firstPixel, int width, size_t& 
   row.values = Buffer<float>(kSamplePlanes * row.count());
   for (size_t s = 0; s < row.count(); ++s, ++next) {
     for (size_t p = 0; p < kSampleInputs; ++p) row.plane(p)[s] = inputs[next * kSampleInputs + p];
-    for (size_t c = 0; c < 3; ++c) row.plane(kExposedAt + c)[s] = light[next * 3 + c];
+    for (size_t c = 0; c < 6; ++c) row.plane(kExposedAt + c)[s] = light[next * 6 + c];
     row.plane(kSampleDepth)[s] = z[next];
   }
   return row;
@@ -49,7 +49,7 @@ TEST(LayersNet, EqualsItsTraining) {
   const int height = int(counts.shape.at(0)), width = int(counts.shape.at(1));
   const auto padded = [](int side) { return (side + 3) / 4 * 4; };
   for (const int layers : {1, 2, 4}) {
-    LayersBand band(net, padded(height), padded(width), {0, padded(height)}, layers, 512);
+    LayersBand band(net, padded(height), padded(width), {0, padded(height)}, layers, 2, 512);
     const auto forRows = [&](const auto& add) {
       size_t next = 0;
       for (int y = 0; y < height; ++y) add(y, rowOf(golden, size_t(y) * size_t(width), width, next));

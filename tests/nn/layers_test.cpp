@@ -35,7 +35,7 @@ SampleRow rowOf(const PlainSamples& samples, int y) {
   for (int x = 0; x < samples.width; ++x)
     for (const PlainSample& sample : samples.at(y, x)) {
       for (size_t p = 0; p < kSampleInputs; ++p) row.plane(p)[s] = float(sample.inputs[p]);
-      for (size_t c = 0; c < 3; ++c) row.plane(kExposedAt + c)[s] = float(sample.colour[c]);
+      for (size_t c = 0; c < 6; ++c) row.plane(kExposedAt + c)[s] = float(sample.colour[c]);
       row.plane(kSampleDepth)[s] = float(sample.depth);
       ++s;
     }
@@ -54,11 +54,12 @@ void run(LayersBand& band, const PlainSamples& samples, const Progress& progress
 
 // [layers][kLayerPlanes][height][width] of a frame in bands of so many rows.
 std::vector<float> denoised(const LayersNet& net, const PlainSamples& samples, int layers, int rows = 1 << 20,
-                            int tile = kTile) {
+                            int tile = kTile, int lights = 1) {
   const size_t pixels = size_t(samples.height) * size_t(samples.width);
   std::vector<float> result(size_t(layers) * kLayerPlanes * pixels, -1.0f);
   for (int y0 = 0; y0 < samples.height; y0 += rows) {
-    LayersBand band(net, samples.height, samples.width, {y0, std::min(y0 + rows, samples.height)}, layers, tile);
+    LayersBand band(net, samples.height, samples.width, {y0, std::min(y0 + rows, samples.height)}, layers, lights,
+                    tile);
     run(band, samples);
     for (int l = 0; l < layers; ++l)
       for (size_t p = 0; p < kLayerPlanes; ++p)
@@ -114,8 +115,24 @@ TEST(LayersNet, EqualsItsTwinForManySamples) {
   const PlainWeights weights = randomLayered(16, 5);
   const PlainSamples samples = randomSamples(4, 8, 400, 3);
   ASSERT_GT(rowOf(samples, 0).count(), 1100U);
-  const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, 2));
-  EXPECT_LT(largestDifference(denoised(LayersNet(fileOf(weights)), samples, 2), expected), 1e-4 * largest(expected));
+  for (const int lights : {1, 2}) {
+    const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, 2, lights));
+    const std::vector<float> result = denoised(LayersNet(fileOf(weights)), samples, 2, 1 << 20, kTile, lights);
+    EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected)) << lights << " lights";
+  }
+}
+
+TEST(LayersNet, DenoisesLightsApart) {
+  const PlainWeights weights = randomLayered(16, 6);
+  const LayersNet net(fileOf(weights));
+  const PlainSamples samples = randomSamples(20, 36, 5, 8);
+  for (const int layers : {1, 2, 4}) {
+    const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, layers, 2));
+    const std::vector<float> result = denoised(net, samples, layers, 1 << 20, kTile, 2);
+    EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected)) << "L = " << layers;
+    EXPECT_GT(largestDifference(result, denoised(net, samples, layers)), 1e-3 * largest(expected));
+    EXPECT_LT(largestDifference(denoised(net, samples, layers, 8, 8, 2), expected), 1e-4 * largest(expected));
+  }
 }
 
 TEST(LayersNet, IsCloseInBfloat16) {
@@ -136,7 +153,7 @@ TEST(LayersNet, TellsTheShares) {
   const LayersNet net(fileOf(weights));
   const PlainSamples samples = randomSamples(8, 12, 5, 4);
   const LayeredResult expected = LayeredTwin(weights).denoise(samples, 4);
-  LayersBand band(net, 8, 12, {0, 8}, 4, kTile);
+  LayersBand band(net, 8, 12, {0, 8}, 4, 1, kTile);
   run(band, samples);
   size_t first = 0;
   for (int y = 0; y < 8; ++y) {
@@ -158,7 +175,7 @@ TEST(LayersBand, KeepsAColourThatIsTheSameEverywhere) {
     for (const PlainSample& sample : pixel) sum += sample.weight();
     for (PlainSample& sample : pixel) {
       sample.inputs[16] /= sum;
-      for (double& c : sample.colour) c = 0.7;
+      for (double& c : sample.colour) c = 0.35;
     }
   }
   const std::vector<float> one = denoised(net, samples, 1);
@@ -207,7 +224,7 @@ TEST(LayersBand, SkipsWhatIsEmptyWithTheSameAnswer) {
     for (int y = 0; y < samples.height; ++y)
       for (int x = 0; x < samples.width; ++x)
         if (first ? y >= 20 || x >= 29 : y < 44 || x < 99) samples.at(y, x).clear();
-    LayersBand band(net, 64, 128, {0, 64}, 2, 32);
+    LayersBand band(net, 64, 128, {0, 64}, 2, 1, 32);
     run(band, samples);
     EXPECT_EQ(band.filtered() + band.skipped(), 2U * 2 * 4);
     EXPECT_EQ(band.filtered(), 2U * 2);  // the corner's tile, and its neighbour, which the filter reaches from there
@@ -224,7 +241,7 @@ TEST(LayersBand, SkipsAnEmptyLayer) {
   weights.tensors["partition.2.bias"].values = {-40, 40, 0, 0};
   const LayersNet net(fileOf(weights));
   const PlainSamples samples = randomSamples(32, 32, 3, 9);
-  LayersBand band(net, 32, 32, {0, 32}, 2, kTile);
+  LayersBand band(net, 32, 32, {0, 32}, 2, 1, kTile);
   run(band, samples);
   EXPECT_EQ(band.filtered(), 1U);
   EXPECT_EQ(band.skipped(), 1U);
@@ -238,7 +255,7 @@ TEST(LayersBand, SkipsAnEmptyLayer) {
 TEST(LayersBand, ReportsAndStops) {
   const LayersNet net(fileOf(randomLayered(16, 4)));
   const PlainSamples samples = randomSamples(64, 128, 2, 9);
-  LayersBand band(net, 64, 128, {0, 64}, 2, 64);
+  LayersBand band(net, 64, 128, {0, 64}, 2, 1, 64);
   double last = 0;
   Progress progress;
   progress.report = [&](double done) { last = done; };
@@ -246,7 +263,7 @@ TEST(LayersBand, ReportsAndStops) {
   EXPECT_DOUBLE_EQ(last, 1);
   std::stop_source source;
   source.request_stop();
-  LayersBand other(net, 64, 128, {0, 64}, 2, 64);
+  LayersBand other(net, 64, 128, {0, 64}, 2, 1, 64);
   EXPECT_THROW(run(other, samples, {{}, source.get_token()}), Cancelled);
 }
 
@@ -306,6 +323,7 @@ TEST(LayersNet, CountsItsArithmetic) {
   EXPECT_DOUBLE_EQ(net.flopPerPixel(0, 1), 2 * (unet + context + layer));
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 1), 2 * (8 * 2 * reducer + unet + context + layer));
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4), 2 * (8 * (2 * reducer + partition) + unet + context + 4 * layer));
+  EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4, 2), 2 * (8 * (4 * reducer + partition) + 2 * (unet + context + 4 * layer)));
 }
 
 TEST(LayersNet, RefusesOtherFiles) {

@@ -234,6 +234,17 @@ class Inputs(unittest.TestCase):
             self.assertFalse(samples.measure(counts, {**channels, **bins}, 4).values[:, samples.WHERE["noise"]].any())
         self.assertFalse(samples.measure(counts, channels).values[:, samples.WHERE["noise"]].any())
 
+    def test_lights_apart_are_all_of_the_light(self):
+        counts, channels = self.channels()
+        deep = samples.measure(counts, channels)
+        diffuse, specular = samples.lights_apart(deep)
+        np.testing.assert_allclose(samples.light_of(diffuse.values) + samples.light_of(specular.values), samples.light_of(deep.values), rtol=1e-6)
+        self.assertFalse(diffuse.values[:, 3:6].any() or specular.values[:, :3].any())
+        noise = deep.values[:, samples.WHERE["noise"]]
+        np.testing.assert_array_equal(diffuse.values[:, samples.WHERE["noise"]], noise * [1, 0])
+        np.testing.assert_array_equal(specular.values[:, samples.WHERE["noise"]], noise * [0, 1])
+        self.assertEqual(len(samples.lights_apart(diffuse)), 1)
+
     def test_what_is_missing(self):
         channels = {"A": 1.0, "Z": 2.0, "R": 0.1, "G": 0.2, "B": 0.3, "variance.R": 0.01, "variance.G": 0.01, "variance.B": 0.01}
         deep = samples.measure(np.ones((1, 1), int), {name: np.array([value], np.float32) for name, value in channels.items()}, 7)

@@ -55,9 +55,11 @@ def write_samples(path, random, spp=SPP, width=WIDTH, height=HEIGHT):
     counts = there.sum(1).reshape(height, width)
     exr.write_deep(f"{path}.{spp}.samples.exr", counts, channels, {"fathom:spp": spp, "fathom:ppuScale": 50.0})
     covered = there.mean(1).reshape(height, width)
-    mean = (there * (albedo + 0.1)).mean(1).reshape(height, width)
     reference = {"A": covered, "Z": np.full((height, width), 3.0)}
-    reference.update({name: mean * (1 + 0.1 * k) for k, name in enumerate("RGB")})
+    for k, c in enumerate("RGB"):
+        reference[f"specular.{c}"] = 0.1 * covered
+        reference[f"diffuse.{c}"] = (there * albedo).mean(1).reshape(height, width) * (1 + 0.1 * k)
+        reference[c] = reference[f"diffuse.{c}"] + reference[f"specular.{c}"]
     exr.write(f"{path}.ref.exr", reference)
 
 
@@ -154,9 +156,9 @@ class Data(unittest.TestCase):
         frame = self.cache().frames[0]
         pixels, targets = frame.crop(3, 5, 32)
         targets = np.array(targets)
-        lit = pixels[..., :3] + pixels[..., 3:6]
-        targets[..., :3] = lit.sum(2) / SPP
-        kinds = set()
+        targets[..., 3:6], targets[..., 6:9] = pixels[..., :3].sum(2) / SPP, pixels[..., 3:6].sum(2) / SPP
+        targets[..., :3] = targets[..., 3:6] + targets[..., 6:9]
+        kinds, lights = set(), set()
         layers_augment.WANTED, wanted = {1.0: 1.0}, layers_augment.WANTED
         self.addCleanup(setattr, layers_augment, "WANTED", wanted)
         for seed in range(40):
@@ -166,7 +168,9 @@ class Data(unittest.TestCase):
                 np.testing.assert_allclose(np.bincount(pixel, weight * light[:, c], 32 * 32), target[..., c].ravel(), rtol=1e-4, atol=1e-5)
             np.testing.assert_allclose(np.bincount(pixel, weight, 32 * 32).max(), 1, rtol=1e-5)
             kinds.add((len(pixel), bool(values[:, 13].any()), bool(values[:, 9:12].any())))
+            lights.add((bool(values[:, :3].any()), bool(values[:, 3:6].any())))
         self.assertGreater(len(kinds), 4)
+        self.assertEqual(lights, {(True, True), (True, False), (False, True)})
 
     def test_places_on_the_lens_turn_with_the_picture(self):
         lens = np.float32([0.75, 0.9])  # to the right and up

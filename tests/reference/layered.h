@@ -8,7 +8,7 @@ namespace fathom::reference {
 // A sample as the network takes it: its weight is the 17th input.
 struct PlainSample {
   std::vector<double> inputs;  // 20
-  double colour[3] = {};       // exposed, not premultiplied
+  double colour[6] = {};       // exposed, not premultiplied: diffuse and specular light
   double depth = 0;
 
   double weight() const { return inputs[16]; }
@@ -34,8 +34,35 @@ class LayeredTwin {
  public:
   explicit LayeredTwin(const PlainWeights& weights) : weights_(weights) {}
 
-  // Sides are multiples of 4.
-  LayeredResult denoise(const PlainSamples& samples, int layers) const {
+  // Sides are multiples of 4. Two lights: the diffuse and the specular one apart.
+  LayeredResult denoise(const PlainSamples& samples, int layers, int lights = 1) const {
+    if (lights == 1) return denoiseOne(samples, layers);
+    LayeredResult result = denoiseOne(with(samples, {3, 4, 5, 18}, {3, 4, 5}), layers);
+    const LayeredResult other = denoiseOne(with(samples, {0, 1, 2, 17}, {0, 1, 2}), layers, &result.shares);
+    for (size_t l = 0; l < result.layers.size(); ++l) {
+      Volume& layer = result.layers[l];
+      const size_t colours = 3 * size_t(layer.height) * size_t(layer.width);
+      for (size_t i = 0; i < layer.values.size(); ++i)
+        layer.values[i] = (layer.values[i] + other.layers[l].values[i]) / (i < colours ? 1 : 2);
+    }
+    result.flat = composited(result.layers);
+    return result;
+  }
+
+ private:
+  // Samples of which some inputs and some colours are nothing.
+  static PlainSamples with(PlainSamples samples, const std::vector<size_t>& inputs,
+                           const std::vector<size_t>& colours) {
+    for (std::vector<PlainSample>& pixel : samples.pixels)
+      for (PlainSample& sample : pixel) {
+        for (const size_t i : inputs) sample.inputs[i] = 0;
+        for (const size_t c : colours) sample.colour[c] = 0;
+      }
+    return samples;
+  }
+
+  LayeredResult denoiseOne(const PlainSamples& samples, int layers,
+                           const std::vector<std::vector<double>>* given = nullptr) const {
     const int height = samples.height, width = samples.width;
     Volume mean(32, height, width);
     std::vector<std::vector<std::vector<double>>> embeddings(samples.pixels.size());
@@ -58,10 +85,11 @@ class LayeredTwin {
         std::vector<double> h = dense("partition.embedding", embeddings[pixel][s]);
         for (int c = 0; c < 32; ++c) h[size_t(c)] += partition.at(c, y, x);
         const std::vector<double> q =
-            shares(dense("partition.2", rectified(dense("partition.1", rectified(std::move(h))))), layers);
+            given ? (*given)[result.shares.size()]
+                  : shares(dense("partition.2", rectified(dense("partition.1", rectified(std::move(h))))), layers);
         for (int l = 0; l < layers; ++l) {
           const double w = sample.weight() * q[size_t(l)];
-          for (int c = 0; c < 3; ++c) sums[size_t(l)].at(c, y, x) += w * sample.colour[c];
+          for (int c = 0; c < 3; ++c) sums[size_t(l)].at(c, y, x) += w * (sample.colour[c] + sample.colour[3 + c]);
           sums[size_t(l)].at(3, y, x) += w;
           sums[size_t(l)].at(5, y, x) += w * sample.depth;
           for (int c = 0; c < 32; ++c) embedding[size_t(l)].at(c, y, x) += w * embeddings[pixel][s][size_t(c)];
@@ -79,7 +107,6 @@ class LayeredTwin {
     return result;
   }
 
- private:
   template <class Body>
   static void forPixels(const PlainSamples& samples, const Body& body) {
     for (int y = 0; y < samples.height; ++y)

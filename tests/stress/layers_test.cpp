@@ -100,7 +100,7 @@ reference::PlainSamples samplesOf(const DeepImage& image, const LayerScale& scal
       for (size_t s = row.samples.first[size_t(x)]; s < row.samples.first[size_t(x) + 1]; ++s) {
         reference::PlainSample sample;
         for (size_t p = 0; p < size_t(nn::kSampleInputs); ++p) sample.inputs.push_back(double(row.samples.plane(p)[s]));
-        for (size_t c = 0; c < 3; ++c) sample.colour[c] = double(row.samples.plane(nn::kExposedAt + c)[s]);
+        for (size_t c = 0; c < 6; ++c) sample.colour[c] = double(row.samples.plane(nn::kExposedAt + c)[s]);
         sample.depth = double(row.samples.plane(nn::kSampleDepth)[s]);
         result.at(y, x).push_back(std::move(sample));
       }
@@ -115,7 +115,8 @@ void expectLikeTwin(const DeepImage& image, int layers) {
   const Results found = run(image, randomNet(), layers);
   uint64_t count = 0;
   const reference::PlainSamples samples = samplesOf(image, found.scale, count);
-  const reference::LayeredResult expected = reference::LayeredTwin(weights).denoise(samples, layers);
+  const reference::LayeredResult expected =
+      reference::LayeredTwin(weights).denoise(samples, layers, found.scale.lights);
   double most = 1e-30, worst = 0;
   for (const auto& pixel : samples.pixels)
     for (const auto& sample : pixel)
