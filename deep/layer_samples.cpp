@@ -96,8 +96,8 @@ class RowMaker {
 
   void make(const std::vector<float>& weights, const std::vector<float>& alphas) {
     std::ranges::copy(weights, plane(nn::kWeightInput));
-    addLight(alphas);
     addFeatures(alphas);
+    addLight(alphas);
     addDepths();
     addNoise(weights, alphas);
     addCounts(weights);
@@ -116,20 +116,24 @@ class RowMaker {
     for (size_t i = 0; i < places_.size(); ++i) to[i] = value(places_[i], i);
   }
 
+  bool divided() const { return scale_.lights.front() == nn::SampleLight::Diffuse; }
+  // What the diffuse light of a sample is divided by; after the features.
+  float divisor(size_t c, size_t i) const {
+    return divided() ? samples_.plane(kAlbedoAt + c)[i] + nn::kLeastAlbedo : 1.0f;
+  }
+
   // As it is, and with a logarithm to be taken.
   void addLight(const std::vector<float>& alphas) {
-    const float e = scale_.exposure;
     for (size_t c = 0; c < 3; ++c) {
       const auto exposed = [&](float value, size_t i) {
-        return std::min(std::max(e * value / alphas[i], 0.0f), kMostExposed);
+        return std::clamp(scale_.exposure * value / alphas[i], -kMostExposed, kMostExposed);
       };
-      fill(kDiffuseAt + c, [&](uint64_t s, size_t i) { return exposed(light_.diffuseAt(c, s), i); });
-      fill(kSpecularAt + c, [&](uint64_t s, size_t i) { return exposed(light_.specularAt(c, s), i); });
-      const auto bounded = [&](float value, size_t i) {
-        return std::clamp(e * value / alphas[i], -kMostExposed, kMostExposed);
-      };
-      fill(nn::kExposedAt + c, [&](uint64_t s, size_t i) { return bounded(light_.diffuseAt(c, s), i); });
-      fill(nn::kExposedAt + 3 + c, [&](uint64_t s, size_t i) { return bounded(light_.specularAt(c, s), i); });
+      fill(nn::kExposedAt + c,
+           [&](uint64_t s, size_t i) { return exposed(light_.diffuseAt(c, s) / divisor(c, i), i); });
+      fill(nn::kExposedAt + 3 + c, [&](uint64_t s, size_t i) { return exposed(light_.specularAt(c, s), i); });
+      for (const auto& [to, from] :
+           {std::pair(kDiffuseAt + c, nn::kExposedAt + c), {kSpecularAt + c, nn::kExposedAt + 3 + c}})
+        fill(to, [&](uint64_t, size_t i) { return std::max(plane(from)[i], 0.0f); });
     }
   }
 
@@ -170,7 +174,8 @@ class RowMaker {
       const size_t count = places_.size();
       fill(kNoiseAt + k, [&](uint64_t, size_t i) {
         const float mean = light[i] / 3 + light[count + i] / 3 + light[2 * count + i] / 3;
-        return std::min(scale_.exposure * deviations[i] / (mean + kDark), kLargestDeviation);
+        const float by = k ? 1.0f : (divisor(0, i) + divisor(1, i) + divisor(2, i)) / 3;
+        return std::min(scale_.exposure * deviations[i] / (by * (mean + kDark)), kLargestDeviation);
       });
     }
   }
@@ -267,7 +272,10 @@ LayerScale LayerScaleSum::result() const {
     std::copy_n(light_.data() + c * dataWindow_.area(), dataWindow_.area(),
                 frame.add(std::string(1, "RGB"[c])).values.data());
   const double mean = weight_ > 0 ? depth_ / weight_ : 1;
-  return {flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f, {}, diffuse_ && specular_ ? 2 : 1};
+  LayerScale scale{flat::exposureOf(frame), mean > 0 ? float(mean) : 1.0f};
+  if (diffuse_) scale.lights = {nn::SampleLight::Diffuse};
+  if (diffuse_ && specular_) scale.lights.push_back(nn::SampleLight::Specular);
+  return scale;
 }
 
 LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerScale& scale, int y) {
@@ -277,14 +285,17 @@ LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerS
   LayerRow row;
   row.emission = Buffer<float>(3 * width, 0.0f);
   row.emissionDepth = Buffer<float>(width, 0.0f);
+  row.render = Buffer<float>(width, 0.0f);
   row.nonFinite.resize(width);
   row.samples.first.push_back(0);
   std::vector<float> weights, alphas;
   const size_t first = size_t(y - rows.dataWindow.y0) * width;
   for (size_t x = 0; x < width; ++x) {
+    double bright = 0;
     forSamples(
         rows, light, alpha, z, first + x,
         [&](uint64_t s, float w, float a) {
+          for (size_t c = 0; c < 3; ++c) bright += double(w) * double(light.at(c, s) / a) / 3;
           row.places.push_back(s);
           weights.push_back(w);
           alphas.push_back(a);
@@ -294,6 +305,7 @@ LayerRow layerRow(const DeepImage& rows, const LayerInputs& inputs, const LayerS
           if (row.emissionDepth[x] == 0 && isFinite(z[s])) row.emissionDepth[x] = z[s];
         });
     row.samples.first.push_back(uint32_t(row.places.size()));
+    row.render[x] = float(bright);
     for (uint64_t s = rows.offsets[first + x]; s < rows.offsets[first + x + 1]; ++s)
       row.nonFinite[x] += alpha[s] > 0 && (!isFinite(z[s]) || !light.finite(s, std::min(alpha[s], 1.0f)));
   }

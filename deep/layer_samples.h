@@ -30,8 +30,8 @@ struct LayerScale {
   float exposure = 1;                          // see flat/neural_planes
   float depth = 1;                             // the mean by weight
   std::optional<flat::LightCurve> light = {};  // what the denoised light is multiplied by, where that is known
-  // Of diffuse and specular light, where the frame has both; they go through the network apart.
-  int lights = 1;
+  // What goes through the network apart: diffuse light, divided by the albedo, and specular light, as far as there is any.
+  std::vector<nn::SampleLight> lights = {nn::SampleLight::Both};
 };
 
 // Made from the rows of a frame, in any pieces from the top.
@@ -53,6 +53,7 @@ class LayerScaleSum {
 struct LayerRow {
   nn::SampleRow samples;
   std::vector<uint64_t> places;  // of its samples, in the planes of the image
+  Buffer<float> render;          // of each pixel the brightness of these, the mean of R, G and B
   // Of each pixel the light of samples without alpha, R G B, as it comes through what is before them; and the nearest depth
   // of any of these.
   Buffer<float> emission, emissionDepth;

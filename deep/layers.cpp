@@ -141,15 +141,10 @@ class BandRun {
     for (size_t c = 0; c < 3; ++c)
       std::copy_n(row.emission.data() + c * width, width, result_.emission.data() + c * plane + first);
     std::copy_n(row.emissionDepth.data(), width, result_.emissionDepth.data() + first);
-    const nn::SampleRow& samples = row.samples;
-    const float* weight = samples.plane(nn::kWeightInput);
     for (size_t x = 0; x < width; ++x) {
-      double sum = 0;
-      for (size_t i = samples.first[x]; i < samples.first[x + 1]; ++i)
-        for (size_t c = 0; c < 3; ++c) sum += double(weight[i]) * double(samples.exposed(nn::SampleLight::Both, c, i));
-      sum /= double(scale_.exposure);
-      for (size_t c = 0; c < 3; ++c) sum += double(row.emission[c * width + x]);
-      result_.render[first + x] = row.nonFinite[x] ? std::numeric_limits<float>::quiet_NaN() : float(sum / 3);
+      float sum = row.render[x];
+      for (size_t c = 0; c < 3; ++c) sum += row.emission[c * width + x] / 3;
+      result_.render[first + x] = row.nonFinite[x] ? std::numeric_limits<float>::quiet_NaN() : sum;
       nonFinite_ += row.nonFinite[x];
     }
   }
@@ -204,11 +199,11 @@ template <class Take>
 void forBands(const nn::LayersNet& net, const LayersParams& params, const LayerSource& source, const LayerScale& scale,
               int y0, int y1, const Progress& progress, LayersCounts* counts, const Take& take) {
   const Box& window = source.dataWindow;
-  const size_t least = leastLayersBytes(net, params.layers, scale.lights, window);
+  const size_t least = leastLayersBytes(net, params.layers, int(scale.lights.size()), window);
   if (params.memory && params.memory < least)
     fail("expected at least {} MB for the layered network, found {} MB", least / 1'000'000 + 1,
          params.memory / 1'000'000);
-  const Cut cut = cutFor(net, params, scale.lights, window);
+  const Cut cut = cutFor(net, params, int(scale.lights.size()), window);
   tbb::task_arena arena(cut.threads);
   const int first = y0 - window.y0, last = y1 - window.y0;
   for (int y = first; y < last;) {
@@ -291,7 +286,7 @@ void denoiseLayers(const nn::LayersNet& net, const LayersParams& params, const L
 
 std::vector<std::pair<int, int>> layersBands(const nn::LayersNet& net, const LayersParams& params,
                                              const LayerScale& scale, const Box& window) {
-  const Cut cut = cutFor(net, params, scale.lights, window);
+  const Cut cut = cutFor(net, params, int(scale.lights.size()), window);
   std::vector<std::pair<int, int>> result;
   for (int y = 0; y < window.height(); y += cut.rows)
     result.emplace_back(window.y0 + y, window.y0 + std::min(y + cut.rows, window.height()));

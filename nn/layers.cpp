@@ -79,12 +79,13 @@ double LayersNet::flopPerPixel(double samples, int layers, int lights) const {
   double pixel = context_->graph().flopPerPixel();
   for (int i = 0; i < kLayerScales; ++i)
     pixel += layers * (kernel_[i]->graph().flopPerPixel() + 2.0 * kKernelTaps * kSplatted) / (1 << 2 * i);
-  return samples * (embed + second) + lights * pixel;
+  const double divisor = lights > 1 ? 2.0 * kKernelTaps * kDivisors * layers * (1 + 1 / 4.0 + 1 / 16.0) : 0;
+  return samples * (embed + second) + lights * pixel + divisor;
 }
 
 double LayersNet::bandBytes(int layers, int lights) const {
   const double partition = double(bytesOf(element())) * kEmbedding, kernels = partition * (1 + 1 / 4.0 + 1 / 16.0);
-  const double sums = layers * sizeof(float) * (kEmbedding + kSplatted);
+  const double sums = layers * sizeof(float) * (kEmbedding + kSplatted + kDivisors);
   const double results = layers * sizeof(float) * kLayerPlanes;
   return lights * (sizeof(float) * kEmbedding + kernels + sums) + partition + results + 1;
 }
@@ -94,7 +95,8 @@ double LayersNet::tileBytes() const {
   double filter = 0;
   for (int i = 0; i < kLayerScales; ++i) {
     filter = std::max(filter, double(arenaOf(*kernel_[i], kSide >> i)));
-    filter += double(kSide >> i) * (kSide >> i) * (2 * kEmbedding + kSplatted + 2 * kLayerPlanes) * sizeof(float);
+    filter += double(kSide >> i) * (kSide >> i) * (2 * kEmbedding + kSplatted + 2 * kLayerPlanes + 3 * kDivisors) *
+              sizeof(float);
   }
   const double input = double(kSide) * kSide * kEmbedding * double(bytesOf(element()) + sizeof(float));
   work = std::max(work + input, filter);

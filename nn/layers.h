@@ -5,8 +5,9 @@
 // splatted with kernels of that layer at three scales. Departures: kernels are exp of clamped logits, without the frame's
 // maximum, which would tie tiles together; a hundredth is taken off each share, so that layers can be exactly empty; what
 // misses everything (alpha below 1) passes all layers; scales are joined in each layer, before compositing, so that layers
-// exist at full size; diffuse and specular light are filtered apart, as pixel networks do. Graphs and the other
-// departures: nn/layers_graphs.h.
+// exist at full size; diffuse and specular light are filtered apart, as pixel networks do, the diffuse one divided by the
+// albedo of its sample, and what a layer becomes is multiplied by the albedo of the pixel's own samples in that layer.
+// Graphs and the other departures: nn/layers_graphs.h.
 #pragma once
 
 #include <memory>
@@ -20,9 +21,13 @@
 
 namespace fathom::nn {
 
+// What diffuse light is divided by: the albedo and this.
+constexpr float kLeastAlbedo = 0.02f;
+
 // Planes of a row of samples: kSampleInputs inputs, as training has them, all finite; then what is splatted, R G B of the
-// diffuse and of the specular light.
+// diffuse and of the specular light. Where the diffuse light is filtered by itself it is divided, in the inputs, too.
 enum SamplePlane : size_t {
+  kAlbedoInput = 6,
   kWeightInput = 16,
   kExposedAt = kSampleInputs,
   kSampleDepth = kExposedAt + 6,
@@ -59,7 +64,8 @@ class LayersNet {
   Element element() const { return context_->element(); }
   int block() const { return context_->sizes().block; }
 
-  // Arithmetic per pixel of so many samples in the network's layers and filters, of so many lights; borders come on top.
+  // Arithmetic per pixel of so many samples in the network's layers and filters, of both lights at once or of two apart;
+  // borders come on top.
   double flopPerPixel(double samples, int layers, int lights = 1) const;
   // How far away samples may be that a result depends on; and those that are splatted into it.
   int halo() const { return meanHalo_ + filterHalo_; }

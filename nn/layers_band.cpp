@@ -19,6 +19,9 @@ Window scaled(const Window& window, int scale) {
   return {window.x >> scale, window.y >> scale, window.width >> scale, window.height >> scale};
 }
 
+constexpr float kAround = 0.125f;  // the weight of the divisor around a pixel beside that of its own samples
+constexpr float kTiny = 1e-12f;
+
 // The pixels of the samples of a chunk.
 std::vector<uint32_t> pixelsOf(const SampleRow& row, const SampleChunk& chunk, size_t firstPixel) {
   std::vector<uint32_t> result(chunk.count);
@@ -32,8 +35,8 @@ std::vector<uint32_t> pixelsOf(const SampleRow& row, const SampleChunk& chunk, s
 
 }  // namespace
 
-LayersBand::LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int lights,
-                       int tile)
+LayersBand::LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers,
+                       const std::vector<SampleLight>& lights, int tile)
     : net_(net),
       height_(height),
       width_(width),
@@ -42,12 +45,12 @@ LayersBand::LayersBand(const LayersNet& net, int height, int width, const Interv
       rows_(rows),
       sumRows_(clipped(rows.around(net.filterHalo()), height)),
       meanRows_(clipped(sumRows_.around(net.meanHalo()), height)),
-      lights_(size_t(lights)) {
+      lights_(lights.size()) {
   for (const int side : {height, width, rows.begin, rows.end})
     if (side % LayersNet::kAlignment != 0 || side < 0) throw std::logic_error("sides are multiples of 4");
   if (layers != 1 && layers != 2 && layers != 4) throw std::logic_error("layers are 1, 2 or 4");
-  if (lights != 1 && lights != 2) throw std::logic_error("lights are 1 or 2");
-  if (lights == 2) lights_[0].light = SampleLight::Diffuse, lights_[1].light = SampleLight::Specular;
+  if (lights.empty()) throw std::logic_error("a band has a light at least");
+  for (size_t i = 0; i < lights.size(); ++i) lights_[i].light = lights[i];
   const size_t pixels = size_t(meanHeight()) * size_t(width_);
   for (Light& light : lights_) light.mean = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
   occupied_ = Buffer<uint8_t>(pixels, 0);
@@ -136,7 +139,7 @@ void LayersBand::makeContext(const Progress& progress) {
     light.mean = {};
     light.sums.resize(size_t(layers_));
     for (Sums& sums : light.sums) {
-      sums.planes = Buffer<float>(kSplatted * pixels, 0.0f);
+      sums.planes = Buffer<float>(light.splatted() * pixels, 0.0f);
       std::fill_n(sums.planes.data() + 4 * pixels, pixels, 1.0f);  // what misses everything passes all layers
       sums.embedding = Buffer<float>(groups() * pixelFloats() * pixels, 0.0f);
     }
@@ -167,6 +170,8 @@ void LayersBand::addChunk(Light& light, int y, const SampleRow& row, const Sampl
       for (size_t c = 0; c < 3; ++c) to[c * plane] += w * row.exposed(light.light, c, s);
       to[3 * plane] += w;
       to[5 * plane] += w * row.plane(kSampleDepth)[s];
+      for (size_t c = 0; light.divided() && c < kDivisors; ++c)
+        to[(kSplatted + c) * plane] += w * (row.plane(kAlbedoInput + c)[s] + kLeastAlbedo);
     }
     addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), weight.data(), pixels.data(),
                 chunk.count, light.sums[size_t(l)].embedding.data(), pixelFloats() * plane);
@@ -182,9 +187,9 @@ void LayersBand::addSums(int y, const SampleRow& row) {
     for (size_t l = 0; several && l < size_t(layers_); ++l)
       std::copy_n(chunk.shares + l * chunk.shareStride, chunk.count, kept.data() + l * row.count() + chunk.begin);
   });
-  if (several)
-    embedRow(net_, row, lights_[1].light, [&](const SampleChunk& chunk) {
-      addChunk(lights_[1], y, row, chunk, kept.data() + chunk.begin, row.count());
+  for (size_t i = 1; i < lights_.size(); ++i)
+    embedRow(net_, row, lights_[i].light, [&](const SampleChunk& chunk) {
+      addChunk(lights_[i], y, row, chunk, kept.data() + chunk.begin, row.count());
     });
   for (Light& light : lights_) finishOccupancy(light, y);
 }
@@ -213,7 +218,8 @@ class LayersBand::TileFilter {
     for (Light& light : band_.lights_) {
       shrink(light, layer);
       for (int i = 0; i < kLayerScales; ++i) filter(light, i);
-      join();
+      join(light);
+      if (light.divided()) multiply();
       addToResult(layer);
     }
     return true;
@@ -241,17 +247,18 @@ class LayersBand::TileFilter {
     const int groups = int(band_.groups()), block = net_.block();
     for (int i = 0; i < kLayerScales; ++i) {
       const int height = from_.height >> i, width = from_.width >> i;
-      values_[i].resize(kSplatted, height, width);
+      values_[i].resize(light.splatted(), height, width);
       embedding_[i] = Buffer<float>(size_t(groups * block) * size_t(height) * size_t(width));
       if (i == 0) {
-        for (size_t p = 0; p < kSplatted; ++p)
+        for (size_t p = 0; p < light.splatted(); ++p)
           for (int y = 0; y < height; ++y)
             std::copy_n(band_.sumRow(light, layer, p, from_.y + y) + from_.x, width, values_[0].row(p, y));
         cropGroups(reinterpret_cast<const std::byte*>(light.sums[size_t(layer)].embedding.data()), size_t(groups),
                    band_.sumHeight(), band_.width_, size_t(block) * sizeof(float), insideBand(),
                    reinterpret_cast<std::byte*>(embedding_[0].data()));
       } else {
-        halve(std::as_const(values_[i - 1]).planes(kSplatted), 2 * height, 2 * width, values_[i].planes(kSplatted));
+        const size_t planes = light.splatted();
+        halve(std::as_const(values_[i - 1]).planes(planes), 2 * height, 2 * width, values_[i].planes(planes));
         halveGroups(embedding_[i - 1].data(), groups, 2 * height, 2 * width, block, embedding_[i].data());
       }
       values_[i].clearBorders();
@@ -269,21 +276,36 @@ class LayersBand::TileFilter {
     const std::byte* inputs[] = {input.data(), context.data()};
     plan->run(inputs, arena.data());
     const std::byte* logits = Plan::result(*plan, arena.data(), net_.kernelValues(i).logits);
-    splat(reinterpret_cast<const float*>(logits), net_.block(), values_[i], splatted_[i], i ? nullptr : &shares_);
+    splat(reinterpret_cast<const float*>(logits), net_.block(), values_[i], light.divided(), splatted_[i],
+          i ? nullptr : &shares_);
   }
 
-  void join() {
+  void join(const Light& light) {
+    const size_t planes = light.made();
     const std::vector<float> ones(size_t(from_.width), 1.0f);
-    scaleRows(shares_, splatted_[0], joined_);
-    const auto enlarge = [](WidePlanes& to, const float* factor, ptrdiff_t stride, const WidePlanes& from) {
-      addEnlarged(to.planes(kLayerPlanes), to.height(), to.width(), factor, stride, from.planes(kLayerPlanes));
+    scaleRows(shares_, splatted_[0], planes, joined_);
+    const auto enlarge = [&](WidePlanes& to, const float* factor, ptrdiff_t stride, const WidePlanes& from) {
+      addEnlarged(to.planes(planes), to.height(), to.width(), factor, stride, from.planes(planes));
     };
     enlarge(joined_, shares_.row(1, 0), shares_.stride(), splatted_[1]);
-    half_.resize(kLayerPlanes, from_.height / 2, from_.width / 2);
-    for (size_t p = 0; p < kLayerPlanes; ++p)
+    half_.resize(planes, from_.height / 2, from_.width / 2);
+    for (size_t p = 0; p < planes; ++p)
       for (int y = 0; y < half_.height(); ++y) std::fill_n(half_.row(p, y), half_.width(), 0.0f);
     enlarge(half_, ones.data(), 0, splatted_[2]);
     enlarge(joined_, shares_.row(2, 0), shares_.stride(), half_);
+  }
+
+  // By the divisor of a pixel's own samples in the layer, and, beside them, what the kernels make of it.
+  void multiply() {
+    for (int y = tile_.y - from_.y; y < tile_.y - from_.y + tile_.height; ++y) {
+      const float *weight = values_[0].row(3, y), *alpha = joined_.row(3, y);
+      for (size_t c = 0; c < kDivisors; ++c) {
+        const float *own = values_[0].row(kSplatted + c, y), *around = joined_.row(kLayerPlanes + c, y);
+        float* light = joined_.row(c, y);
+        for (int x = tile_.x - from_.x; x < tile_.x - from_.x + tile_.width; ++x)
+          light[x] *= (own[x] + kAround * around[x] / std::max(alpha[x], kTiny)) / (weight[x] + kAround);
+      }
+    }
   }
 
   LayersBand& band_;

@@ -18,10 +18,10 @@ namespace fathom::nn {
 class LayersBand {
  public:
   // Rows [rows.begin, rows.end) of a frame of height x width, all multiples of LayersNet::kAlignment; `layers` is 1, 2 or 4;
-  // tiles have at most `tile` pixels a side. With two lights the diffuse and the specular one go through the network apart,
-  // in the layers that the diffuse one makes: their colours are added, and what a layer covers is the mean. The net must
-  // outlive this.
-  LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers, int lights, int tile);
+  // tiles have at most `tile` pixels a side. Lights go through the network apart, in the layers that the first one makes: their
+  // colours are added, and what a layer covers is the mean. The net must outlive this.
+  LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers,
+             const std::vector<SampleLight>& lights, int tile);
 
   const Interval& rows() const { return rows_; }
   const Interval& meanRows() const { return meanRows_; }
@@ -45,13 +45,17 @@ class LayersBand {
 
  private:
   struct Sums {
-    Buffer<float> planes, embedding;  // [kSplatted][rows][width], [groups][rows][width][block]
+    Buffer<float> planes, embedding;  // [splatted][rows][width], [groups][rows][width][block]
   };
   struct Light {
     SampleLight light = SampleLight::Both;
     Buffer<float> mean;                      // [groups][mean rows][width][block]
     Buffer<std::byte> kernel[kLayerScales];  // contexts, [groups][sum rows >> scale][width >> scale][block]
     std::vector<Sums> sums;                  // of each layer
+
+    bool divided() const { return light == SampleLight::Diffuse; }
+    size_t splatted() const { return kSplatted + (divided() ? kDivisors : 0); }
+    size_t made() const { return kLayerPlanes + (divided() ? kDivisors : 0); }
   };
 
   class TileFilter;

@@ -18,6 +18,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace fathom::nn {
 namespace HWY_NAMESPACE {
+constexpr size_t kMostSplatted = kSplatted + kDivisors;
 namespace hn = hwy::HWY_NAMESPACE;
 
 using D = hn::ScalableTag<float>;
@@ -107,23 +108,32 @@ void WeightRow(const float* HWY_RESTRICT logits, size_t groupStride, int block, 
 }
 
 // One row of results. weights[i], values[i]: the weights' and the splatted rows of row y + 2 - i, which gives by tap row i.
-void SplatRow(const float* const* weights, size_t stride, const float* const (*values)[kSplatted], size_t width,
-              float* const* to) {
+template <size_t kPlanes>
+HWY_INLINE void SplatPlanes(const float* const* weights, size_t stride, const float* const (*values)[kMostSplatted],
+                            size_t width, float* const* to) {
   const D d;
-  const V tiny = hn::Set(d, 1e-12f), one = hn::Set(d, 1.0f);
+  const V tiny = hn::Set(d, 1e-12f), one = hn::Set(d, 1.0f), zero = hn::Zero(d);
   for (size_t x = 0; x < width; x += hn::Lanes(d)) {
-    V sum[kSplatted] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    V sum[kMostSplatted] = {zero, zero, zero, zero, zero, zero, zero, zero, zero};
     for (size_t i = 0; i < kKernelWidth; ++i)
       for (size_t j = 0; j < kKernelWidth; ++j) {
         const ptrdiff_t from = ptrdiff_t(x) + kKernelWidth / 2 - ptrdiff_t(j);
         const V w = hn::LoadU(d, weights[i] + (i * kKernelWidth + j) * stride + from);
-        for (size_t p = 0; p < kSplatted; ++p) sum[p] = hn::MulAdd(w, hn::LoadU(d, values[i][p] + from), sum[p]);
+        for (size_t p = 0; p < kPlanes; ++p) sum[p] = hn::MulAdd(w, hn::LoadU(d, values[i][p] + from), sum[p]);
       }
     const V scale = hn::Div(one, hn::Add(sum[4], tiny));
     for (size_t c = 0; c < 3; ++c) hn::StoreU(hn::Mul(sum[c], scale), d, to[c] + x);
     hn::StoreU(hn::Min(hn::Mul(sum[3], scale), one), d, to[3] + x);
-    hn::StoreU(hn::Mul(sum[5], scale), d, to[4] + x);
+    for (size_t p = 5; p < kPlanes; ++p) hn::StoreU(hn::Mul(sum[p], scale), d, to[p - 1] + x);
   }
+}
+
+void SplatRow(const float* const* weights, size_t stride, const float* const (*values)[kMostSplatted], bool divided,
+              size_t width, float* const* to) {
+  if (divided)
+    SplatPlanes<kMostSplatted>(weights, stride, values, width, to);
+  else
+    SplatPlanes<kSplatted>(weights, stride, values, width, to);
 }
 
 void ScaleRow(const float* HWY_RESTRICT factor, const float* HWY_RESTRICT from, size_t width, float* HWY_RESTRICT to) {
@@ -204,7 +214,10 @@ void halveGroups(const float* from, int groups, int height, int width, int block
     halveRow(from + 2 * y * row, from + (2 * y + 1) * row, size_t(width / 2), size_t(block), to + y * row / 2);
 }
 
-void splat(const float* logits, int block, const WidePlanes& values, WidePlanes& result, WidePlanes* shares) {
+void splat(const float* logits, int block, const WidePlanes& values, bool divided, WidePlanes& result,
+           WidePlanes* shares) {
+  constexpr size_t kMost = kSplatted + kDivisors;
+  const size_t splatted = divided ? kMost : kSplatted, planes = splatted - 1;
   constexpr int kRows = kKernelWidth, kReach = kKernelWidth / 2;
   const int height = values.height(), width = values.width();
   const size_t rowFloats = size_t(width) * size_t(block), groupStride = size_t(height) * rowFloats;
@@ -213,7 +226,7 @@ void splat(const float* logits, int block, const WidePlanes& values, WidePlanes&
   std::array<Buffer<float>, kRows> ring;
   for (Buffer<float>& weights : ring) weights = Buffer<float>(kKernelTaps * stride, 0.0f);
   const Buffer<float> none(kKernelTaps * stride, 0.0f);
-  result.resize(kLayerPlanes, height, width);
+  result.resize(planes, height, width);
   if (shares) shares->resize(kLayerScales, height, width);
   const auto weightRow = HWY_DYNAMIC_DISPATCH(WeightRow);
   const auto splatRow = HWY_DYNAMIC_DISPATCH(SplatRow);
@@ -231,22 +244,22 @@ void splat(const float* logits, int block, const WidePlanes& values, WidePlanes&
     const int y = made - kReach;
     if (!inside(y)) continue;
     const float* weights[kRows];
-    const float* rows[kRows][kSplatted];
+    const float* rows[kRows][kMost] = {};
     for (int i = 0; i < kRows; ++i) {
       const int from = y + kReach - i;
       weights[i] = (inside(from) ? ring[size_t(from % kRows)] : none).data() + WidePlanes::kBorder;
-      for (size_t p = 0; p < kSplatted; ++p) rows[i][p] = values.row(p, inside(from) ? from : y);
+      for (size_t p = 0; p < splatted; ++p) rows[i][p] = values.row(p, inside(from) ? from : y);
     }
-    float* to[kLayerPlanes];
-    for (size_t p = 0; p < kLayerPlanes; ++p) to[p] = result.row(p, y);
-    splatRow(weights, stride, rows, size_t(width), to);
+    float* to[kMost] = {};
+    for (size_t p = 0; p < planes; ++p) to[p] = result.row(p, y);
+    splatRow(weights, stride, rows, divided, size_t(width), to);
   }
 }
 
-void scaleRows(const WidePlanes& factor, const WidePlanes& from, WidePlanes& to) {
-  to.resize(kLayerPlanes, from.height(), from.width());
+void scaleRows(const WidePlanes& factor, const WidePlanes& from, size_t count, WidePlanes& to) {
+  to.resize(count, from.height(), from.width());
   const auto scaleRow = HWY_DYNAMIC_DISPATCH(ScaleRow);
-  for (size_t p = 0; p < kLayerPlanes; ++p)
+  for (size_t p = 0; p < count; ++p)
     for (int y = 0; y < from.height(); ++y)
       scaleRow(factor.row(0, y), from.row(p, y), size_t(from.width()), to.row(p, y));
 }

@@ -15,6 +15,7 @@ namespace fathom::nn {
 // What a layer's kernels splat, and what comes out of them.
 constexpr size_t kSplatted = 6;     // R, G, B, weight, occupancy, depth, each times the weight but for the occupancy
 constexpr size_t kLayerPlanes = 5;  // R, G, B (premultiplied), alpha, depth times alpha
+constexpr size_t kDivisors = 3;     // behind both, where light is divided: R, G, B of what by, times weight or alpha
 
 // Planes whose rows have zeros on both sides, and room for whole vectors on the right. Keeps its memory.
 class WidePlanes {
@@ -51,13 +52,15 @@ void layerShares(const float* logits, int block, size_t count, int layers, float
 // [groups][height][width][block] (sides even) to the mean of 2x2 pixels.
 void halveGroups(const float* from, int groups, int height, int width, int block, float* to);
 
-// Splats `values` (kSplatted planes with clear borders) with kernels exp(clamp(logit, -12, 12)) of 5x5 taps, row-major from
+// Splats `values` (kSplatted planes with clear borders, and kDivisors if `divided`) with kernels exp(clamp(logit, -12, 12)) of 5x5 taps, row-major from
 // (-2, -2): what pixel q gives to q + d is weighed by tap d of q. Pixels beyond the borders do not exist. `result` gets
-// kLayerPlanes planes: sums of colours, weights and depths over those of occupancies; alpha at most 1. `logits`:
+// kLayerPlanes planes (and kDivisors): sums of colours, weights, depths (and divisors) over those of occupancies; alpha at
+// most 1. `logits`:
 // [groups][height][width][block]; for `shares` that are given, three more channels, whose softmax becomes its planes.
-void splat(const float* logits, int block, const WidePlanes& values, WidePlanes& result, WidePlanes* shares);
+void splat(const float* logits, int block, const WidePlanes& values, bool divided, WidePlanes& result,
+           WidePlanes* shares);
 
-// to = a * b, for one row of `a` and each of kLayerPlanes of `b`; all as wide.
-void scaleRows(const WidePlanes& factor, const WidePlanes& from, WidePlanes& to);
+// to = a * b, for one row of `a` and each of `count` planes of `b`; all as wide.
+void scaleRows(const WidePlanes& factor, const WidePlanes& from, size_t count, WidePlanes& to);
 
 }  // namespace fathom::nn

@@ -8,7 +8,7 @@ one and with many, and some whose alphas do not add up to 1. OUT's tensors, S sa
   counts (height, width): samples of each pixel
   A, Z, coc, lens.U, ..., diffuse.R, ...  (S): channels as in a deep file, premultiplied
   exposure, depth (1): the scale of the light, and the mean depth
-  inputs (S, 20), weight (S), light (S, 6): what the network reads of them; light, diffuse and specular, times the exposure, not premultiplied
+  inputs (S, 20), weight (S), light (S, 6): what the network reads of them; diffuse light, divided, and specular light times the exposure
   sample_inputs (S, 20): the same without variance.* and samples, of SPP camera samples per pixel
   partition{L} (S, L); radiance{L} (L, 3, height, width), opacity{L} and depth{L} (L, height, width): of the layers, premultiplied
   colour{L} (3, height, width), alpha{L} (height, width): the result. L is 1, 2 and 4; all light is times the exposure. The lights
@@ -54,15 +54,21 @@ def random_frame(random, width, height):
     return counts, {name: x.astype(np.float32) for name, x in channels.items()}
 
 
+def inputs_of(deep, scale, depth):
+    """The inputs of both lights, each with what is its own."""
+    diffuse, specular = (samples.listed(x, scale, depth)[0] for x in samples.lights_apart(deep))
+    return np.where(np.isin(np.arange(diffuse.shape[1]), (3, 4, 5, 18)), specular, diffuse)
+
+
 def golden(model, width, height, seed=7):
     counts, channels = random_frame(np.random.default_rng(seed), width, height)
     deep = samples.measure(counts, channels)
     scale, depth = samples.exposure_of(deep), samples.mean_depth(deep)
-    frame, *lights = (assembled([samples.listed(x, scale, depth)], samples.padded(deep.shape)) for x in (deep, *samples.lights_apart(deep)))
+    lights = [assembled([samples.listed(x, scale, depth)], samples.padded(deep.shape)) for x in samples.lights_apart(deep)]
     tensors = {"counts": counts, "exposure": [scale], "depth": [depth], **channels}
-    tensors.update(inputs=frame.inputs.numpy(), weight=frame.weight.numpy(), light=np.concatenate([x.light.numpy() for x in lights], 1))
+    tensors.update(inputs=inputs_of(deep, scale, depth), weight=lights[0].weight.numpy(), light=np.concatenate([x.light.numpy() for x in lights], 1))
     plain = {name: x for name, x in channels.items() if name != "samples" and not name.startswith("variance.")}
-    tensors["sample_inputs"] = samples.listed(samples.measure(counts, plain, SPP), scale, depth)[0]
+    tensors["sample_inputs"] = inputs_of(samples.measure(counts, plain, SPP), scale, depth)
     for k in LAYERS:
         with torch.no_grad():
             first = model.result(lights[0], k)

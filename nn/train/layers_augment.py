@@ -7,7 +7,7 @@ from augment import FAINT, PATTERNED, SHARES, STOPS, drawn_pattern
 from clusters import PHYSICAL, chosen, gathered, labels
 from layers_model import assembled
 from planes import LIGHTS
-from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, inputs, light_of, pixel_deviations
+from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, divided, inputs, light_of, pixel_deviations
 
 # Raw camera samples; bins of them; all of a pixel in one, which is what a network on pixels sees.
 FORMS = {"samples": 0.5, "bins": 0.35, "pixels": 0.15}
@@ -86,7 +86,7 @@ def turned(random, samples, targets):
 
 
 def with_one_light(random, samples, targets):
-    """The crop with its diffuse or its specular light alone, or with both; and targets (height, width, 5): of that light, alpha, counts."""
+    """The crop with its diffuse or its specular light alone, or with both; targets (height, width, 5): of that light, alpha, counts; and its name."""
     means = dict(zip(LIGHTS, targets[..., : 3 * len(LIGHTS)].reshape(-1, len(LIGHTS), 3).mean((0, 2))))
     names = [name for name in LIGHTS if name == "rgb" or means[name] > FAINT * means["rgb"]]
     shares = np.array([SHARES[name] for name in names])
@@ -95,12 +95,12 @@ def with_one_light(random, samples, targets):
         if light not in ("rgb", name):
             samples[..., WHERE[name]] = 0
     first = 3 * LIGHTS.index(light)
-    return samples, np.concatenate([targets[..., first : first + 3], targets[..., -2:]], -1)
+    return samples, np.concatenate([targets[..., first : first + 3], targets[..., -2:]], -1), light
 
 
 def varied(random, frame, samples, targets):
     """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 5), light times the exposure."""
-    samples, targets = with_one_light(random, *turned(random, samples, targets))
+    samples, targets, light = with_one_light(random, *turned(random, samples, targets))
     if random.random() < PATTERNED:
         pattern = drawn_pattern(random, *targets.shape[:2])[0][:, :, None]
         samples[..., :6] *= pattern[..., None]
@@ -110,11 +110,14 @@ def varied(random, frame, samples, targets):
             np.minimum(albedo * pattern[..., None], 1, out=albedo)
     form = random.choice(list(FORMS), p=list(FORMS.values()))
     values, weight, pixel = formed(random, form, samples.reshape(-1, *samples.shape[2:]), frame.spp, frame.scale)
-    without(values, missing(random, frame.given))
+    gone = missing(random, frame.given)
+    without(values, gone)
+    apart = light == "diffuse" and "components" not in gone
+    values, divisor = divided(values) if apart else (values, np.ones((len(values), 3), np.float32))
     scale = frame.exposure * 2.0 ** random.uniform(-STOPS, STOPS)
     targets[..., :3] = scale * np.maximum(targets[..., :3], 0)
     z = values[:, WHERE["depth"]][:, 0]
-    return (inputs(values, weight, scale, frame.depth), weight, scale * light_of(values), z / frame.depth, pixel), targets
+    return (inputs(values, weight, scale, frame.depth), weight, scale * light_of(values), z / frame.depth, divisor, pixel), targets
 
 
 class Batches(augment.Batches):

@@ -7,7 +7,8 @@ what misses everything passes all layers; partitions below FLOOR are none, so th
 
 Samples are a ragged list: `pixel` says for each of S samples in which of frames * height * width pixels it lies. Sides are multiples of
 4. A layer's kernels depend on the layer by its embeddings alone: the same weights serve 1, 2 and 4 layers. Diffuse and specular light are filtered
-apart, with their own kernels, in the layers that the samples were put in with the diffuse light (`together`).
+apart, with their own kernels, in the layers that the samples were put in with the diffuse light (`together`). Diffuse light is divided by the
+albedo of its sample, and what a layer becomes is multiplied by the albedo of the pixel's own samples in that layer (`albedo_of`).
 
 The names of the layers are the interface to the C++ side: `state_dict()` and the weight file have the same names.
 """
@@ -29,11 +30,12 @@ FLOOR = 0.01
 LARGEST_LOGIT = 12.0
 STEEPEST = 1e-3  # gradient of a share; those of a loss that is a mean over crops are a hundredth of this
 TINY = 1e-12
+OWN = 0.125  # the weight of what the kernels make of the divisor, beside that of a pixel's own samples
 SCALES = 3
 
 # inputs: (S, 20), see samples.py; weight: (S,), a pixel's sum is at most 1; light: (S, 3), times the exposure, not premultiplied;
-# depth: (S,); pixel: (S,) integers; shape: (frames, height, width).
-Samples = namedtuple("Samples", "inputs weight light depth pixel shape")
+# depth: (S,); divisor: (S, 3), what light was divided by; pixel: (S,) integers; shape: (frames, height, width).
+Samples = namedtuple("Samples", "inputs weight light depth divisor pixel shape")
 
 # colour (frames, 3, height, width) and alpha (frames, 1, height, width); radiance (L, frames, 3, height, width), opacity and depth
 # (L, frames, 1, height, width): of the layers, front to back, premultiplied. partition: (S, L). logits: of all kernels; `features`: what they
@@ -42,7 +44,7 @@ Result = namedtuple("Result", "colour alpha radiance opacity depth partition log
 
 
 def assembled(parts, shape):
-    """Samples of frames of one shape, from the arrays of each: inputs, weight, light, depth, and pixel within the frame."""
+    """Samples of frames of one shape, from the arrays of each: inputs, weight, light, depth, divisor, and pixel within the frame."""
     columns = [list(x) for x in zip(*parts)]
     columns[-1] = [pixel + k * shape[0] * shape[1] for k, pixel in enumerate(columns[-1])]
     tensors = [torch.from_numpy(np.concatenate(x)) for x in columns]
@@ -118,6 +120,12 @@ class Sharpened(torch.autograd.Function):
         return gradient.clamp(-STEEPEST, STEEPEST)
 
 
+def albedo_of(filtered, own):
+    """What light is to be multiplied by: the divisor of the pixel's own samples, and of those around it where it has few."""
+    around = (filtered[:, 5:] / filtered[:, 3:4].clamp(min=TINY)).detach()
+    return (own[:, 2:] + OWN * around) / (own[:, :1] + OWN)
+
+
 def rows_of(image):
     """(frames * height * width, channels) of an image."""
     return image.permute(0, 2, 3, 1).reshape(-1, image.shape[1])
@@ -187,34 +195,38 @@ class Layered(nn.Module):
         scales = self.unet.scales(summed(weight * embedding))
         if partition is None:
             partition = self.shares(rows_of(scales[0]), embedding, samples.pixel, layers)
-        # Light, weight and depth, then the embedding: what a sample gives to a layer, for its share.
-        given = torch.cat([samples.light, torch.ones_like(weight), samples.depth[:, None], embedding], 1)
+        # Light, weight, depth and divisor, then the embedding: what a sample gives to a layer, for its share.
+        given = torch.cat([samples.light, torch.ones_like(weight), samples.depth[:, None], samples.divisor, embedding], 1)
         sums = [summed(weight * partition[:, k : k + 1] * given) for k in range(layers)]
         missed = (1 - sum(x[:, 3:4] for x in sums)).clamp(min=0)
         behind, values = missed, []
         for x in reversed(sums):
             behind = behind + x[:, 3:4]  # occupancy: 1 less what the layers in front took
-            values.insert(0, torch.cat([x[:, :4], behind, x[:, 4:5]], 1))
-        values, embeddings = torch.cat(values), torch.cat([x[:, 5:] for x in sums])
+            values.insert(0, torch.cat([x[:, :4], behind, x[:, 4:8]], 1))
+        values, embeddings = torch.cat(values), torch.cat([x[:, 8:] for x in sums])
+        own = torch.cat([x[:, 3:8] for x in sums])
 
-        spread, logits = [], []
+        spread, logits, owned = [], [], []
         for k in range(SCALES):
             filtered, logit = self.filtered(k, scales[k], values, embeddings)
             spread.append(filtered)
             logits.append(logit)
-            values, embeddings = half_size(values), half_size(embeddings)
-        apart = [self.apart(x, layers) for x in spread]
+            owned.append(own)
+            values, embeddings, own = half_size(values), half_size(embeddings), half_size(own)
+        apart = [self.apart(x, y, layers) for x, y in zip(spread, owned)]
         coarse = [composited(x[0], x[1])[0] for x in apart[1:]]
         mix = torch.softmax(logits[0][:, TAPS:], 1)
         full = [spread[0], upsampled(spread[1]), upsampled(upsampled(spread[2]))]
-        radiance, opacity, depth = self.apart(sum(mix[:, k : k + 1] * x for k, x in enumerate(full)), layers)
+        radiance, opacity, depth = self.apart(sum(mix[:, k : k + 1] * x for k, x in enumerate(full)), owned[0], layers)
         colour, alpha = composited(radiance, opacity)
         return Result(colour, alpha, radiance, opacity, depth, partition, [x[:, :TAPS] for x in logits], scales, coarse)
 
     @staticmethod
-    def apart(filtered, layers):
-        """Radiance, opacity and depth, (layers, frames, ...), of what has the layers behind one another."""
-        x = filtered.reshape(layers, -1, *filtered.shape[1:])
+    def apart(filtered, own, layers):
+        """Radiance, opacity and depth, (layers, frames, ...), of what has the layers behind one another; own: weight, depth and divisor of
+        the pixels' samples."""
+        radiance = filtered[:, :3] * albedo_of(filtered, own)
+        x = torch.cat([radiance, filtered[:, 3:5]], 1).reshape(layers, -1, 5, *filtered.shape[2:])
         return x[:, :, :3], x[:, :, 3:4], x[:, :, 4:5]
 
 

@@ -22,13 +22,14 @@ COLUMNS = {"diffuse": 3, "specular": 3, "albedo": 3, "normal": 3, "depth": 1, "c
 WHERE, WIDTH = layout(COLUMNS)
 FEATURES = ("albedo", "normal", "coc", "lens")
 UNKNOWN_ALBEDO = 0.5
+LEAST_ALBEDO = 0.02
 COC_UNIT = 4  # pixels
 COUNT_UNIT = 8  # doublings
 LARGEST = 1e15  # beyond, a value counts as not finite
 
 # values: (S, WIDTH) float32; weight: (S,), the share of the pixel; pixel: (S,), ascending; shape: (height, width); given: those of FEATURES that
-# the frame has.
-Deep = namedtuple("Deep", "values weight pixel shape given")
+# the frame has; divisor: (S, 3), what the light was divided by.
+Deep = namedtuple("Deep", "values weight pixel shape given divisor", defaults=(1,))
 
 
 def effective(alpha, counts):
@@ -114,20 +115,32 @@ def light_of(values):
     return values[:, WHERE["diffuse"]] + values[:, WHERE["specular"]]
 
 
-def alone(values, light):
-    """A list with one of LIGHTS[1:] as all of its light, in place."""
+def divided(values):
+    """A list whose light is diffuse, divided by the albedo; and the divisor (S, 3)."""
+    divisor = np.clip(values[:, WHERE["albedo"]], 0, 1) + np.float32(LEAST_ALBEDO)
+    values = values.copy()
+    values[:, WHERE["diffuse"]] /= divisor
+    values[:, WHERE["noise"].start] /= divisor.mean(1)
+    return values, divisor
+
+
+def alone(deep, light):
+    """A list with one of LIGHTS[1:] as all of its light, the diffuse one divided."""
+    values = deep.values.copy()
     for k, name in enumerate(LIGHTS[1:]):
         if name != light:
             values[:, WHERE[name]] = 0
             values[:, WHERE["noise"].start + k] = 0
-    return values
+    if light == "diffuse":
+        values, divisor = divided(values)
+        return deep._replace(values=values, divisor=divisor)
+    return deep._replace(values=values)
 
 
 def lights_apart(deep):
-    """What the network denoises one after the other: the diffuse and the specular light of a list; all of it at once where it has one kind."""
-    if not all(deep.values[:, WHERE[name]].any() for name in LIGHTS[1:]):
-        return [deep]
-    return [deep._replace(values=alone(deep.values.copy(), name)) for name in LIGHTS[1:]]
+    """What the network denoises one after the other, of what light a list has: first the diffuse, then the specular one."""
+    found = [name for name in LIGHTS[1:] if deep.values[:, WHERE[name]].any()]
+    return [alone(deep, name) for name in found or LIGHTS[2:]]
 
 
 def flattened(deep, columns):
@@ -174,8 +187,9 @@ def padded(shape):
 
 
 def listed(deep, scale, depth):
-    """Inputs, weights, exposed light, depths and pixels of the padded frame: what layers_model.assembled takes."""
+    """Inputs, weights, exposed light, depths, divisors and pixels of the padded frame: what layers_model.assembled takes."""
     rows, columns = np.divmod(deep.pixel, deep.shape[1])
     z = deep.values[:, WHERE["depth"]][:, 0]
     pixel = rows * padded(deep.shape)[1] + columns
-    return inputs(deep.values, deep.weight, scale, depth), deep.weight, scale * light_of(deep.values), z, pixel
+    divisor = np.broadcast_to(deep.divisor, (len(z), 3))
+    return inputs(deep.values, deep.weight, scale, depth), deep.weight, scale * light_of(deep.values), z, divisor, pixel

@@ -34,7 +34,9 @@ nn::SampleRow randomRow(uint32_t seed) {
 
 // Runs one frame; seconds of its four steps are added to `steps`.
 void runFrame(const LayersNet& net, const std::vector<nn::SampleRow>& rows, int layers, int lights, double* steps) {
-  LayersBand band(net, kSide, kSide, {0, kSide}, layers, lights, kTile);
+  using enum nn::SampleLight;
+  const std::vector<nn::SampleLight> one = {Both}, two = {Diffuse, Specular};
+  LayersBand band(net, kSide, kSide, {0, kSide}, layers, lights == 1 ? one : two, kTile);
   const std::vector<std::function<void()>> parts = {
       [&] { parallelFor(0, kSide, [&](int y) { band.addMeans(y, rows[size_t(y)]); }); }, [&] { band.makeContext(); },
       [&] { parallelFor(0, kSide, [&](int y) { band.addSums(y, rows[size_t(y)]); }); }, [&] { band.filter(); }};

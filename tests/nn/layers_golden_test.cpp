@@ -49,7 +49,8 @@ TEST(LayersNet, EqualsItsTraining) {
   const int height = int(counts.shape.at(0)), width = int(counts.shape.at(1));
   const auto padded = [](int side) { return (side + 3) / 4 * 4; };
   for (const int layers : {1, 2, 4}) {
-    LayersBand band(net, padded(height), padded(width), {0, padded(height)}, layers, 2, 512);
+    LayersBand band(net, padded(height), padded(width), {0, padded(height)}, layers,
+                    {SampleLight::Diffuse, SampleLight::Specular}, 512);
     const auto forRows = [&](const auto& add) {
       size_t next = 0;
       for (int y = 0; y < height; ++y) add(y, rowOf(golden, size_t(y) * size_t(width), width, next));

@@ -36,12 +36,12 @@ void expectNear(const WidePlanes& planes, const Volume& expected, double bound) 
 TEST(LayerKernels, SplatEqualsItsTwin) {
   forSimdTargets([] {
     WidePlanes result, shares;  // kept: what an image leaves behind must not matter to the next
-    for (const int block : {8, 16})
+    for (const auto& [block, divided] : {std::pair(8, false), {16, false}, {8, true}, {16, true}})
       for (const auto& [height, width] : kSizes) {
         const Volume logits = randomVolume(28, height, width, 1, -3, 3);
-        const Volume values = randomVolume(6, height, width, 2, 0, 2);
+        const Volume values = randomVolume(divided ? 9 : 6, height, width, 2, 0, 2);
         const Buffer<float> grouped32 = grouped(logits, block, 32 / block, 1e30f);
-        splat(grouped32.data(), block, wide(values), result, &shares);
+        splat(grouped32.data(), block, wide(values), divided, result, &shares);
         expectNear(result, splatted(logits, values), 1e-5);
         Volume lambda(3, height, width);
         for (int i = 0; i < height * width; ++i) {
@@ -51,7 +51,7 @@ TEST(LayerKernels, SplatEqualsItsTwin) {
           for (int c = 0; c < 3; ++c) lambda.at(c, y, x) /= total;
         }
         expectNear(shares, lambda, 1e-6);
-        splat(grouped32.data(), block, wide(values), result, nullptr);
+        splat(grouped32.data(), block, wide(values), divided, result, nullptr);
         expectNear(result, splatted(logits, values), 1e-5);
       }
   });
@@ -64,11 +64,11 @@ TEST(LayerKernels, SplatClampsLogitsAndIsFiniteWithoutWeights) {
       logits.values[i] = i % 7 == 0 ? 1e30 : i % 5 == 0 ? -1e30 : i % 3 == 0 ? 80 : 11.3;
     WidePlanes result, shares;
     const Buffer<float> grouped32 = grouped(logits, 16, 2, 0);
-    splat(grouped32.data(), 16, wide(values), result, &shares);
+    splat(grouped32.data(), 16, wide(values), false, result, &shares);
     expectNear(result, Volume(5, 3, 19), 0);
     for (size_t i = 4 * 3 * 19; i < 5 * 3 * 19; ++i) values.values[i] = 1;
     values.at(0, 1, 9) = values.at(3, 1, 9) = 1;
-    splat(grouped32.data(), 16, wide(values), result, &shares);
+    splat(grouped32.data(), 16, wide(values), false, result, &shares);
     expectNear(result, splatted(logits, values), 1e-5);
   });
 }
@@ -138,7 +138,7 @@ TEST(LayerKernels, EnlargedPlanesAreAdded) {
       const Volume fine = randomVolume(5, height, width, 1, 0, 4), factor = randomVolume(1, height, width, 2, 0, 1),
                    coarse = randomVolume(5, halfHeight, halfWidth, 3, 0, 4), up = reference::enlarge(coarse);
       WidePlanes scaled;
-      scaleRows(wide(factor), wide(fine), scaled);
+      scaleRows(wide(factor), wide(fine), 5, scaled);
       Volume expected(5, height, width);
       for (int c = 0; c < 5; ++c)
         for (int y = 0; y < height; ++y)

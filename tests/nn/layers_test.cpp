@@ -21,6 +21,7 @@ using reference::randomLayered;
 using reference::randomSamples;
 
 constexpr int kTile = 512;
+const std::vector<SampleLight> kBoth = {SampleLight::Both}, kApart = {SampleLight::Diffuse, SampleLight::Specular};
 
 WeightFile fileOf(const PlainWeights& weights) {
   return readWeights(reference::safetensors(weights), "random");
@@ -54,7 +55,7 @@ void run(LayersBand& band, const PlainSamples& samples, const Progress& progress
 
 // [layers][kLayerPlanes][height][width] of a frame in bands of so many rows.
 std::vector<float> denoised(const LayersNet& net, const PlainSamples& samples, int layers, int rows = 1 << 20,
-                            int tile = kTile, int lights = 1) {
+                            int tile = kTile, const std::vector<SampleLight>& lights = kBoth) {
   const size_t pixels = size_t(samples.height) * size_t(samples.width);
   std::vector<float> result(size_t(layers) * kLayerPlanes * pixels, -1.0f);
   for (int y0 = 0; y0 < samples.height; y0 += rows) {
@@ -115,10 +116,10 @@ TEST(LayersNet, EqualsItsTwinForManySamples) {
   const PlainWeights weights = randomLayered(16, 5);
   const PlainSamples samples = randomSamples(4, 8, 400, 3);
   ASSERT_GT(rowOf(samples, 0).count(), 1100U);
-  for (const int lights : {1, 2}) {
+  for (const auto& lights : {kBoth, kApart}) {
     const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, 2, lights));
     const std::vector<float> result = denoised(LayersNet(fileOf(weights)), samples, 2, 1 << 20, kTile, lights);
-    EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected)) << lights << " lights";
+    EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected)) << lights.size() << " lights";
   }
 }
 
@@ -127,11 +128,11 @@ TEST(LayersNet, DenoisesLightsApart) {
   const LayersNet net(fileOf(weights));
   const PlainSamples samples = randomSamples(20, 36, 5, 8);
   for (const int layers : {1, 2, 4}) {
-    const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, layers, 2));
-    const std::vector<float> result = denoised(net, samples, layers, 1 << 20, kTile, 2);
+    const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, layers, kApart));
+    const std::vector<float> result = denoised(net, samples, layers, 1 << 20, kTile, kApart);
     EXPECT_LT(largestDifference(result, expected), 1e-4 * largest(expected)) << "L = " << layers;
     EXPECT_GT(largestDifference(result, denoised(net, samples, layers)), 1e-3 * largest(expected));
-    EXPECT_LT(largestDifference(denoised(net, samples, layers, 8, 8, 2), expected), 1e-4 * largest(expected));
+    EXPECT_LT(largestDifference(denoised(net, samples, layers, 8, 8, kApart), expected), 1e-4 * largest(expected));
   }
 }
 
@@ -153,7 +154,7 @@ TEST(LayersNet, TellsTheShares) {
   const LayersNet net(fileOf(weights));
   const PlainSamples samples = randomSamples(8, 12, 5, 4);
   const LayeredResult expected = LayeredTwin(weights).denoise(samples, 4);
-  LayersBand band(net, 8, 12, {0, 8}, 4, 1, kTile);
+  LayersBand band(net, 8, 12, {0, 8}, 4, kBoth, kTile);
   run(band, samples);
   size_t first = 0;
   for (int y = 0; y < 8; ++y) {
@@ -224,7 +225,7 @@ TEST(LayersBand, SkipsWhatIsEmptyWithTheSameAnswer) {
     for (int y = 0; y < samples.height; ++y)
       for (int x = 0; x < samples.width; ++x)
         if (first ? y >= 20 || x >= 29 : y < 44 || x < 99) samples.at(y, x).clear();
-    LayersBand band(net, 64, 128, {0, 64}, 2, 1, 32);
+    LayersBand band(net, 64, 128, {0, 64}, 2, kBoth, 32);
     run(band, samples);
     EXPECT_EQ(band.filtered() + band.skipped(), 2U * 2 * 4);
     EXPECT_EQ(band.filtered(), 2U * 2);  // the corner's tile, and its neighbour, which the filter reaches from there
@@ -241,7 +242,7 @@ TEST(LayersBand, SkipsAnEmptyLayer) {
   weights.tensors["partition.2.bias"].values = {-40, 40, 0, 0};
   const LayersNet net(fileOf(weights));
   const PlainSamples samples = randomSamples(32, 32, 3, 9);
-  LayersBand band(net, 32, 32, {0, 32}, 2, 1, kTile);
+  LayersBand band(net, 32, 32, {0, 32}, 2, kBoth, kTile);
   run(band, samples);
   EXPECT_EQ(band.filtered(), 1U);
   EXPECT_EQ(band.skipped(), 1U);
@@ -255,7 +256,7 @@ TEST(LayersBand, SkipsAnEmptyLayer) {
 TEST(LayersBand, ReportsAndStops) {
   const LayersNet net(fileOf(randomLayered(16, 4)));
   const PlainSamples samples = randomSamples(64, 128, 2, 9);
-  LayersBand band(net, 64, 128, {0, 64}, 2, 1, 64);
+  LayersBand band(net, 64, 128, {0, 64}, 2, kBoth, 64);
   double last = 0;
   Progress progress;
   progress.report = [&](double done) { last = done; };
@@ -263,7 +264,7 @@ TEST(LayersBand, ReportsAndStops) {
   EXPECT_DOUBLE_EQ(last, 1);
   std::stop_source source;
   source.request_stop();
-  LayersBand other(net, 64, 128, {0, 64}, 2, 1, 64);
+  LayersBand other(net, 64, 128, {0, 64}, 2, kBoth, 64);
   EXPECT_THROW(run(other, samples, {{}, source.get_token()}), Cancelled);
 }
 
@@ -323,7 +324,9 @@ TEST(LayersNet, CountsItsArithmetic) {
   EXPECT_DOUBLE_EQ(net.flopPerPixel(0, 1), 2 * (unet + context + layer));
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 1), 2 * (8 * 2 * reducer + unet + context + layer));
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4), 2 * (8 * (2 * reducer + partition) + unet + context + 4 * layer));
-  EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4, 2), 2 * (8 * (4 * reducer + partition) + 2 * (unet + context + 4 * layer)));
+  const double divisor = 25 * 3 * (1 + 1 / 4.0 + 1 / 16.0);
+  EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4, 2),
+                   2 * (8 * (4 * reducer + partition) + 2 * (unet + context + 4 * layer) + 4 * divisor));
 }
 
 TEST(LayersNet, RefusesOtherFiles) {

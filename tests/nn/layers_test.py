@@ -21,7 +21,7 @@ except ImportError as error:
 import golden_layers
 import samples
 import weights
-from layers_model import FLOOR, INPUTS, LAYERS, Layered, Samples, Splat, composited, gigaflops_per_megapixel
+from layers_model import FLOOR, INPUTS, LAYERS, OWN, Layered, Samples, Splat, composited, gigaflops_per_megapixel
 
 torch.set_num_threads(1)
 FOLDER = Path(sys.argv.pop()) if len(sys.argv) > 1 and not sys.argv[-1].startswith("-") else Path(".")
@@ -34,8 +34,8 @@ def some_samples(each=4):
     pixel = torch.arange(PIXELS).repeat_interleave(each)
     pixel = pixel[(pixel % 5 != 0) & (torch.rand(len(pixel)) < 0.8)]
     n = len(pixel)
-    light = torch.rand(n, 3)
-    return Samples(torch.randn(n, INPUTS), torch.full((n,), 1 / each), light, 1 + torch.rand(n), pixel, SHAPE)
+    light, divisor = torch.rand(n, 3), 0.1 + torch.rand(n, 3)
+    return Samples(torch.randn(n, INPUTS), torch.full((n,), 1 / each), light, 1 + torch.rand(n), divisor, pixel, SHAPE)
 
 
 def decided(model, factor=30):
@@ -85,7 +85,7 @@ class Network(unittest.TestCase):
 
     def test_even_light_stays_where_all_is_hit(self):
         n = 3 * PIXELS
-        even = Samples(torch.randn(n, INPUTS), torch.full((n,), 1 / 3), torch.full((n, 3), 0.7), torch.rand(n) + 1,
+        even = Samples(torch.randn(n, INPUTS), torch.full((n,), 1 / 3), torch.full((n, 3), 0.7), torch.rand(n) + 1, torch.ones(n, 3),
                        torch.arange(PIXELS).repeat_interleave(3), SHAPE)  # fmt: skip
         for k in LAYERS:
             result = self.model.result(even, k)
@@ -97,7 +97,7 @@ class Network(unittest.TestCase):
         """Occupancy: with the near half of each pixel's samples in front, what is behind is not thinner for it."""
         near = torch.arange(2 * PIXELS) % 2 == 0
         halves = Samples(torch.randn(2 * PIXELS, INPUTS), torch.full((2 * PIXELS,), 0.25), torch.where(near, 0.2, 0.8)[:, None].expand(-1, 3).contiguous(),
-                         torch.where(near, 1.0, 5.0), torch.arange(PIXELS).repeat_interleave(2), SHAPE)  # fmt: skip
+                         torch.where(near, 1.0, 5.0), torch.ones(2 * PIXELS, 3), torch.arange(PIXELS).repeat_interleave(2), SHAPE)  # fmt: skip
         model = decided(Layered(16), 1)
         model.shares = lambda *_: torch.stack([near, ~near], 1).float()
         with torch.no_grad():
@@ -121,18 +121,21 @@ class Network(unittest.TestCase):
         found = alone.result(s, 1)
         kernels = torch.exp(found.logits[0].clamp(-12, 12)).detach().double().numpy()
         frames, height, width = SHAPE
-        light = np.zeros((frames * height * width, 3))
-        np.add.at(light, s.pixel.numpy(), (s.weight[:, None] * s.light).double().numpy())
-        light = light.reshape(frames, height, width, 3)
-        sums, total = np.zeros_like(light), np.zeros((frames, height, width, 1))
+        given = torch.cat([s.light, s.divisor, torch.ones_like(s.weight)[:, None]], 1)
+        own = np.zeros((frames * height * width, 7))
+        np.add.at(own, s.pixel.numpy(), (s.weight[:, None] * given).double().numpy())
+        own = own.reshape(frames, height, width, 7)
+        sums, total = np.zeros_like(own), np.zeros((frames, height, width, 1))
         for f in range(frames):
             for y, x in np.ndindex(height, width):
                 for tap in range(TAPS):
                     v, u = y + tap // 5 - 2, x + tap % 5 - 2
                     if 0 <= v < height and 0 <= u < width:
-                        sums[f, v, u] += kernels[f, tap, y, x] * light[f, y, x]
+                        sums[f, v, u] += kernels[f, tap, y, x] * own[f, y, x]
                         total[f, v, u] += kernels[f, tap, y, x]
-        expected = torch.from_numpy((sums / total).transpose(0, 3, 1, 2)).float()
+        around = sums[..., 3:6] / sums[..., 6:]
+        albedo = (own[..., 3:6] + OWN * around) / (own[..., 6:] + OWN)
+        expected = torch.from_numpy((sums[..., :3] / total * albedo).transpose(0, 3, 1, 2)).float()
         torch.testing.assert_close(found.colour, expected, rtol=1e-4, atol=1e-5)
         self.assertGreater((result.colour - found.colour).abs().mean().item(), 1e-3)
 
@@ -149,7 +152,7 @@ class Network(unittest.TestCase):
             torch.testing.assert_close(self.model(one, k), self.model(self.samples, k)[:1], rtol=1e-4, atol=1e-5)
 
     def test_nothing_gives_nothing(self):
-        empty = Samples(torch.zeros(0, INPUTS), torch.zeros(0), torch.zeros(0, 3), torch.zeros(0), torch.zeros(0, dtype=torch.long), SHAPE)
+        empty = Samples(torch.zeros(0, INPUTS), torch.zeros(0), torch.zeros(0, 3), torch.zeros(0), torch.zeros(0, 3), torch.zeros(0, dtype=torch.long), SHAPE)
         for k in LAYERS:
             result = self.model.result(empty, k)
             self.assertFalse(result.colour.any() or result.alpha.any())
@@ -238,10 +241,12 @@ class Inputs(unittest.TestCase):
         counts, channels = self.channels()
         deep = samples.measure(counts, channels)
         diffuse, specular = samples.lights_apart(deep)
-        np.testing.assert_allclose(samples.light_of(diffuse.values) + samples.light_of(specular.values), samples.light_of(deep.values), rtol=1e-6)
+        light = [x.divisor * samples.light_of(x.values) for x in (diffuse, specular)]
+        np.testing.assert_allclose(sum(light), samples.light_of(deep.values), rtol=1e-5)
+        np.testing.assert_allclose(diffuse.divisor, deep.values[:, samples.WHERE["albedo"]].clip(0, 1) + 0.02, rtol=1e-6)
         self.assertFalse(diffuse.values[:, 3:6].any() or specular.values[:, :3].any())
         noise = deep.values[:, samples.WHERE["noise"]]
-        np.testing.assert_array_equal(diffuse.values[:, samples.WHERE["noise"]], noise * [1, 0])
+        np.testing.assert_allclose(diffuse.values[:, samples.WHERE["noise"]] * diffuse.divisor.mean(1, keepdims=True), noise * [1, 0], rtol=1e-5)
         np.testing.assert_array_equal(specular.values[:, samples.WHERE["noise"]], noise * [0, 1])
         self.assertEqual(len(samples.lights_apart(diffuse)), 1)
 

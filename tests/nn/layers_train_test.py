@@ -162,10 +162,10 @@ class Data(unittest.TestCase):
         layers_augment.WANTED, wanted = {1.0: 1.0}, layers_augment.WANTED
         self.addCleanup(setattr, layers_augment, "WANTED", wanted)
         for seed in range(40):
-            (values, weight, light, z, pixel), target = layers_augment.varied(np.random.default_rng(seed), frame, pixels, targets.copy())
+            (values, weight, light, z, divisor, pixel), target = layers_augment.varied(np.random.default_rng(seed), frame, pixels, targets.copy())
             self.assertTrue(np.isfinite(values).all() and (np.diff(pixel) >= 0).all() and (z > 0).all())
             for c in range(3):
-                np.testing.assert_allclose(np.bincount(pixel, weight * light[:, c], 32 * 32), target[..., c].ravel(), rtol=1e-4, atol=1e-5)
+                np.testing.assert_allclose(np.bincount(pixel, weight * (divisor * light)[:, c], 32 * 32), target[..., c].ravel(), rtol=1e-4, atol=1e-5)
             np.testing.assert_allclose(np.bincount(pixel, weight, 32 * 32).max(), 1, rtol=1e-5)
             kinds.add((len(pixel), bool(values[:, 13].any()), bool(values[:, 9:12].any())))
             lights.add((bool(values[:, :3].any()), bool(values[:, 3:6].any())))
@@ -213,7 +213,7 @@ class Data(unittest.TestCase):
 class Loss(unittest.TestCase):
     def result(self, places, depth, pixel):
         partition = torch.nn.functional.one_hot(torch.tensor(places), 2).float()
-        listed = Samples(None, torch.ones(len(places)), None, torch.tensor(depth), torch.tensor(pixel), (1, 4, 16))
+        listed = Samples(None, torch.ones(len(places)), None, torch.tensor(depth), None, torch.tensor(pixel), (1, 4, 16))
         return Result(*[None] * 5, partition, *[None] * 3), listed
 
     def order(self, *given):

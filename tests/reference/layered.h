@@ -1,6 +1,7 @@
 // The layered denoiser in double precision, as its description reads, random weights for it, and random samples.
 #pragma once
 
+#include "nn/layers.h"
 #include "tests/reference/layers.h"
 
 namespace fathom::reference {
@@ -34,22 +35,32 @@ class LayeredTwin {
  public:
   explicit LayeredTwin(const PlainWeights& weights) : weights_(weights) {}
 
-  // Sides are multiples of 4. Two lights: the diffuse and the specular one apart.
-  LayeredResult denoise(const PlainSamples& samples, int layers, int lights = 1) const {
-    if (lights == 1) return denoiseOne(samples, layers);
-    LayeredResult result = denoiseOne(with(samples, {3, 4, 5, 18}, {3, 4, 5}), layers);
-    const LayeredResult other = denoiseOne(with(samples, {0, 1, 2, 17}, {0, 1, 2}), layers, &result.shares);
-    for (size_t l = 0; l < result.layers.size(); ++l) {
-      Volume& layer = result.layers[l];
-      const size_t colours = 3 * size_t(layer.height) * size_t(layer.width);
-      for (size_t i = 0; i < layer.values.size(); ++i)
-        layer.values[i] = (layer.values[i] + other.layers[l].values[i]) / (i < colours ? 1 : 2);
+  // Sides are multiples of 4. Lights one after the other, in the layers of the first.
+  LayeredResult denoise(const PlainSamples& samples, int layers,
+                        const std::vector<nn::SampleLight>& lights = {nn::SampleLight::Both}) const {
+    LayeredResult result = denoiseOne(samples, layers, lights[0], nullptr);
+    for (size_t i = 1; i < lights.size(); ++i) {
+      const LayeredResult other = denoiseOne(samples, layers, lights[i], &result.shares);
+      for (size_t l = 0; l < result.layers.size(); ++l)
+        for (size_t k = 0; k < result.layers[l].values.size(); ++k)
+          result.layers[l].values[k] += other.layers[l].values[k];
     }
+    for (Volume& layer : result.layers)
+      for (size_t k = 3 * size_t(layer.height) * size_t(layer.width); k < layer.values.size(); ++k)
+        layer.values[k] /= double(lights.size());
     result.flat = composited(result.layers);
     return result;
   }
 
  private:
+  LayeredResult denoiseOne(const PlainSamples& samples, int layers, nn::SampleLight light,
+                           const std::vector<std::vector<double>>* shares) const {
+    if (light == nn::SampleLight::Both) return filteredTogether(samples, layers, false, shares);
+    if (light == nn::SampleLight::Specular)
+      return filteredTogether(with(samples, {0, 1, 2, 17}, {0, 1, 2}), layers, false, shares);
+    return filteredTogether(with(samples, {3, 4, 5, 18}, {3, 4, 5}), layers, true, shares);
+  }
+
   // Samples of which some inputs and some colours are nothing.
   static PlainSamples with(PlainSamples samples, const std::vector<size_t>& inputs,
                            const std::vector<size_t>& colours) {
@@ -61,8 +72,9 @@ class LayeredTwin {
     return samples;
   }
 
-  LayeredResult denoiseOne(const PlainSamples& samples, int layers,
-                           const std::vector<std::vector<double>>* given = nullptr) const {
+  // divided: by the albedo inputs and 0.02, of which the layers' light gets the mean back.
+  LayeredResult filteredTogether(const PlainSamples& samples, int layers, bool divided,
+                                 const std::vector<std::vector<double>>* given) const {
     const int height = samples.height, width = samples.width;
     Volume mean(32, height, width);
     std::vector<std::vector<std::vector<double>>> embeddings(samples.pixels.size());
@@ -77,8 +89,8 @@ class LayeredTwin {
     const std::vector<Volume> context = unet(mean);
     const Volume partition = convolve(weights_, "partition.context", context[0]);
     LayeredResult result;
-    std::vector<Volume> sums, embedding;  // R, G, B, w, n, Z; E
-    for (int l = 0; l < layers; ++l) sums.emplace_back(6, height, width), embedding.emplace_back(32, height, width);
+    std::vector<Volume> sums, embedding;  // R, G, B, w, n, Z, divisors; E
+    for (int l = 0; l < layers; ++l) sums.emplace_back(9, height, width), embedding.emplace_back(32, height, width);
     forPixels(samples, [&](int y, int x, size_t pixel) {
       for (size_t s = 0; s < samples.pixels[pixel].size(); ++s) {
         const PlainSample& sample = samples.pixels[pixel][s];
@@ -92,6 +104,8 @@ class LayeredTwin {
           for (int c = 0; c < 3; ++c) sums[size_t(l)].at(c, y, x) += w * (sample.colour[c] + sample.colour[3 + c]);
           sums[size_t(l)].at(3, y, x) += w;
           sums[size_t(l)].at(5, y, x) += w * sample.depth;
+          for (int c = 0; c < 3; ++c)
+            sums[size_t(l)].at(6 + c, y, x) += w * (divided ? sample.inputs[size_t(6 + c)] + 0.02 : 1);
           for (int c = 0; c < 32; ++c) embedding[size_t(l)].at(c, y, x) += w * embeddings[pixel][s][size_t(c)];
         }
         result.shares.push_back(q);
@@ -149,7 +163,7 @@ class LayeredTwin {
   }
 
   Volume filtered(const Volume& sums, const Volume& embedding, const std::vector<Volume>& context) const {
-    Volume values = sums, e = embedding, result(5, sums.height, sums.width), lambda;
+    Volume values = sums, e = embedding, result(8, sums.height, sums.width), lambda;
     for (int i = 0; i < 3; ++i) {
       const std::string name = "kernel" + std::to_string(i);
       const Volume first = relu(
@@ -158,12 +172,20 @@ class LayeredTwin {
       if (i == 0) lambda = scaleShares(logits);
       Volume out = splatted(logits, values);
       for (int k = 0; k < i; ++k) out = enlarge(out);
-      for (int c = 0; c < 5; ++c)
+      for (int c = 0; c < 8; ++c)
         for (int y = 0; y < out.height; ++y)
           for (int x = 0; x < out.width; ++x) result.at(c, y, x) += lambda.at(i, y, x) * out.at(c, y, x);
       values = halve(values);
       e = halve(e);
     }
+    for (int c = 0; c < 3; ++c)
+      for (int y = 0; y < sums.height; ++y)
+        for (int x = 0; x < sums.width; ++x) {
+          const double around = result.at(5 + c, y, x) / std::max(result.at(3, y, x), 1e-12);
+          result.at(c, y, x) *= (sums.at(6 + c, y, x) + 0.125 * around) / (sums.at(3, y, x) + 0.125);
+        }
+    result.values.resize(5 * size_t(sums.height) * size_t(sums.width));
+    result.channels = 5;
     return result;
   }
 

@@ -175,21 +175,21 @@ inline std::vector<float> floatsOf(const Volume& v) {
 
 // Splatted and normalised, 5 channels: sums by source pixels, where the kernel gathers by result pixels.
 inline Volume splatted(const Volume& logits, const Volume& values) {
-  Volume sum(6, values.height, values.width), out(5, values.height, values.width);
+  Volume sum(values.channels, values.height, values.width), out(values.channels - 1, values.height, values.width);
   for (int y = 0; y < values.height; ++y)
     for (int x = 0; x < values.width; ++x)
       for (int k = 0; k < 25; ++k) {
         const int ty = y + k / 5 - 2, tx = x + k % 5 - 2;
         if (ty < 0 || tx < 0 || ty >= values.height || tx >= values.width) continue;
         const double weight = std::exp(std::clamp(logits.at(k, y, x), -12.0, 12.0));
-        for (int c = 0; c < 6; ++c) sum.at(c, ty, tx) += weight * values.at(c, y, x);
+        for (int c = 0; c < values.channels; ++c) sum.at(c, ty, tx) += weight * values.at(c, y, x);
       }
   for (int i = 0; i < values.height * values.width; ++i) {
     const int y = i / values.width, x = i % values.width;
     const double n = sum.at(4, y, x) + 1e-12;
     for (int c = 0; c < 3; ++c) out.at(c, y, x) = sum.at(c, y, x) / n;
     out.at(3, y, x) = std::min(1.0, sum.at(3, y, x) / n);
-    out.at(4, y, x) = sum.at(5, y, x) / n;
+    for (int c = 5; c < values.channels; ++c) out.at(c - 1, y, x) = sum.at(c, y, x) / n;
   }
   return out;
 }
