@@ -67,9 +67,6 @@ class LayersBand {
   int meanHeight() const { return meanRows_.end - meanRows_.begin; }
   ContextRow contextRow(int y) const;
   float* sumRow(Light& light, int layer, size_t plane, int y);
-  // Of a tile, what lies within `reach` of anything that `there` tells of, at multiples of kAlignment.
-  template <class There>
-  Window near(const Window& tile, int reach, const There& there) const;
   void contextTile(const Window& tile);
   // A chunk of row y into all layers, `shares` apart by `stride`.
   void addChunk(Light& light, int y, const SampleRow& row, const SampleChunk& chunk, const float* shares,

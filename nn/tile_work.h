@@ -38,6 +38,30 @@ inline Window grown(const Window& window, int halo, int height, int width) {
   return {x0, y0, x1 - x0, y1 - y0};
 }
 
+inline Window scaled(const Window& window, int scale) {
+  return {window.x >> scale, window.y >> scale, window.width >> scale, window.height >> scale};
+}
+
+// Of a tile of a frame of height x width, what lies within `reach` of any pixel that `there` tells of, at multiples of `step`.
+template <class There>
+Window near(const Window& tile, int reach, int height, int width, int step, const There& there) {
+  const Window around = grown(tile, reach, height, width);
+  int x0 = around.x + around.width, y0 = around.y + around.height, x1 = around.x, y1 = around.y;
+  for (int y = around.y; y < around.y + around.height; ++y) {
+    int first = around.x, last = around.x + around.width;
+    while (first < last && !there(first, y)) ++first;
+    if (first == last) continue;
+    while (!there(last - 1, y)) --last;
+    x0 = std::min(x0, first), x1 = std::max(x1, last);
+    y0 = std::min(y0, y), y1 = y + 1;
+  }
+  if (x0 >= x1) return {};
+  x0 = std::max(tile.x, (x0 - reach) / step * step), y0 = std::max(tile.y, (y0 - reach) / step * step);
+  x1 = std::min(tile.x + tile.width, (x1 + reach + step - 1) / step * step);
+  y1 = std::min(tile.y + tile.height, (y1 + reach + step - 1) / step * step);
+  return {x0, y0, x1 - x0, y1 - y0};
+}
+
 inline size_t area(const Window& window) {
   return size_t(window.width) * size_t(window.height);
 }
