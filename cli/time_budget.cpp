@@ -37,12 +37,12 @@ const std::vector<SettingCost>& table() {
       {{Quality::Balanced, false, "oidn"}, 0, 0, 9.93, 0.0897},
       // Of one light: `./run bench nn` on the same machine. Errors: those of `nlm balanced` times what the network's are of
       // them on the three frames that `small` has not learned from (docs/notes.md).
-      {{Quality::Fast, false, "neural", 1}, 0, 0, 0.3, 0.152},
-      {{Quality::Fast, false, "neural", 2}, 0, 0, 0.75, 0.149},
-      {{Quality::Fast, false, "neural", 4}, 0, 0, 1.55, 0.147},
-      {{Quality::Balanced, false, "neural", 1}, 0, 0, 0.6, 0.152},
-      {{Quality::Balanced, false, "neural", 2}, 0, 0, 1.6, 0.149},
-      {{Quality::Balanced, false, "neural", 4}, 0, 0, 3.45, 0.147},
+      {{Quality::Fast, false, "neural", 1}, 0, 0, 0.3, 0.127},
+      {{Quality::Fast, false, "neural", 2}, 0, 0, 0.75, 0.125},
+      {{Quality::Fast, false, "neural", 4}, 0, 0, 1.55, 0.124},
+      {{Quality::Balanced, false, "neural", 1}, 0, 0, 0.6, 0.127},
+      {{Quality::Balanced, false, "neural", 2}, 0, 0, 1.6, 0.125},
+      {{Quality::Balanced, false, "neural", 4}, 0, 0, 3.45, 0.124},
   };
   return costs;
 }

@@ -143,7 +143,7 @@ Kernel splat() {
     nn::WidePlanes wide = reference::wide(values), result, shares;
   };
   const auto v = std::make_shared<Values>();
-  return {"splat", [=] { nn::splat(v->grouped.data(), 16, v->wide, v->result, &v->shares); },
+  return {"splat", [=] { nn::splat(v->grouped.data(), 16, v->wide, false, v->result, &v->shares); },
           [=] { reference::splatted(v->logits, v->values); }};
 }
 
