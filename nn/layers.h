@@ -22,7 +22,7 @@
 namespace fathom::nn {
 
 // What diffuse light is divided by: the albedo and this.
-constexpr float kLeastAlbedo = 0.02f;
+constexpr float kLeastAlbedo = 0.1f;
 
 // Planes of a row of samples: kSampleInputs inputs, as training has them, all finite; then what is splatted, R G B of the
 // diffuse and of the specular light. Where the diffuse light is filtered by itself it is divided, in the inputs, too.

@@ -243,7 +243,7 @@ class Inputs(unittest.TestCase):
         diffuse, specular = samples.lights_apart(deep)
         light = [x.divisor * samples.light_of(x.values) for x in (diffuse, specular)]
         np.testing.assert_allclose(sum(light), samples.light_of(deep.values), rtol=1e-5)
-        np.testing.assert_allclose(diffuse.divisor, deep.values[:, samples.WHERE["albedo"]].clip(0, 1) + 0.02, rtol=1e-6)
+        np.testing.assert_allclose(diffuse.divisor, deep.values[:, samples.WHERE["albedo"]].clip(0, 1) + 0.1, rtol=1e-6)
         self.assertFalse(diffuse.values[:, 3:6].any() or specular.values[:, :3].any())
         noise = deep.values[:, samples.WHERE["noise"]]
         np.testing.assert_allclose(diffuse.values[:, samples.WHERE["noise"]] * diffuse.divisor.mean(1, keepdims=True), noise * [1, 0], rtol=1e-5)

@@ -72,7 +72,7 @@ class LayeredTwin {
     return samples;
   }
 
-  // divided: by the albedo inputs and 0.02, of which the layers' light gets the mean back.
+  // divided: by the albedo inputs and 0.1, of which the layers' light gets the mean back.
   LayeredResult filteredTogether(const PlainSamples& samples, int layers, bool divided,
                                  const std::vector<std::vector<double>>* given) const {
     const int height = samples.height, width = samples.width;
@@ -105,7 +105,7 @@ class LayeredTwin {
           sums[size_t(l)].at(3, y, x) += w;
           sums[size_t(l)].at(5, y, x) += w * sample.depth;
           for (int c = 0; c < 3; ++c)
-            sums[size_t(l)].at(6 + c, y, x) += w * (divided ? sample.inputs[size_t(6 + c)] + 0.02 : 1);
+            sums[size_t(l)].at(6 + c, y, x) += w * (divided ? sample.inputs[size_t(6 + c)] + 0.1 : 1);
           for (int c = 0; c < 32; ++c) embedding[size_t(l)].at(c, y, x) += w * embeddings[pixel][s][size_t(c)];
         }
         result.shares.push_back(q);
