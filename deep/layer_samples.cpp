@@ -131,9 +131,8 @@ class RowMaker {
       fill(nn::kExposedAt + c,
            [&](uint64_t s, size_t i) { return exposed(light_.diffuseAt(c, s) / divisor(c, i), i); });
       fill(nn::kExposedAt + 3 + c, [&](uint64_t s, size_t i) { return exposed(light_.specularAt(c, s), i); });
-      for (const auto& [to, from] :
-           {std::pair(kDiffuseAt + c, nn::kExposedAt + c), {kSpecularAt + c, nn::kExposedAt + 3 + c}})
-        fill(to, [&](uint64_t, size_t i) { return std::max(plane(from)[i], 0.0f); });
+      fill(kDiffuseAt + c, [&](uint64_t, size_t i) { return std::max(plane(nn::kExposedAt + c)[i], 0.0f); });
+      fill(kSpecularAt + c, [&](uint64_t, size_t i) { return std::max(plane(nn::kExposedAt + 3 + c)[i], 0.0f); });
     }
   }
 
