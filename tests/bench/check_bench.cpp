@@ -90,9 +90,9 @@ Kernel mix() {
   constexpr size_t kCount = 49;
   constexpr int kTimes = 4000;
   struct Values {
+    flat::MixNeighbours neighbours;
     std::mt19937 random{3};
     std::vector<reference::MixNeighbour> all = reference::randomNeighbours(kCount, 0.1f, random);
-    flat::MixNeighbours neighbours;
     float sum = 0;
   };
   const auto v = std::make_shared<Values>();
@@ -108,6 +108,7 @@ Kernel mix() {
 
 Kernel curves() {
   constexpr size_t kPixels = 200000;
+  constexpr float kHalf = 0.5f;  // rounds
   struct Values {
     flat::CurveTable table = *flat::CurveTable::make(
         [](std::span<float> x) {
@@ -129,7 +130,7 @@ Kernel curves() {
             for (size_t i = 0; i < kPixels; ++i) {
               uint32_t pixel = 0xff;
               for (size_t c = 0; c < 3; ++c)
-                pixel = pixel << 8 | uint32_t(255 * v->table(v->rgb[c * kPixels + i]) + 0.5f);
+                pixel = pixel << 8 | uint32_t(255 * v->table(v->rgb[c * kPixels + i]) + kHalf);
               v->out[i] = pixel;
             }
           }};
