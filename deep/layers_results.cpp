@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "deep/channels.h"
+#include "flat/limited.h"
 
 namespace fathom::deep {
 
@@ -30,7 +31,8 @@ class Pixels {
   LayerPixel at(int layer, int y, int x) const {
     const auto value = [&](size_t plane) { return rows_.band.row(layer, plane, y - rows_.frame.y0)[x]; };
     const float scale = scale_ * factor(y, x);
-    return {{value(0) * scale, value(1) * scale, value(2) * scale}, value(3), value(4)};
+    const auto colour = [&](size_t c) { return limited(double(value(c)) * double(scale)); };
+    return {{colour(0), colour(1), colour(2)}, value(3), value(4)};
   }
 
   float emission(size_t c, int y, int x) const {
@@ -47,6 +49,7 @@ class Pixels {
       for (size_t c = 0; c < 3; ++c) sum[c] += passed * pixel.colour[c];
       passed *= 1 - pixel.alpha;
     }
+    for (size_t c = 0; c < 3; ++c) sum[c] = limited(double(sum[c]));
     sum[3] = 1 - passed;
     return sum;
   }
@@ -91,7 +94,8 @@ flat::Image flattenedLayers(const LayeredRows& rows) {
     for (int x = 0; x < width; ++x) {
       const std::array<float, 4> sum = pixels.composited(y, x);
       const size_t i = size_t(y - rows.y0) * size_t(width) + size_t(x);
-      for (size_t c = 0; c < 4; ++c) result.planes[c].values[i] = sum[c] + (c < 3 ? pixels.emission(c, y, x) : 0.0f);
+      for (size_t c = 0; c < 4; ++c)
+        result.planes[c].values[i] = c < 3 ? limited(double(sum[c]) + double(pixels.emission(c, y, x))) : sum[c];
     }
   });
   return result;
@@ -151,7 +155,7 @@ DeepImage inLayerColours(DeepImage image, const LayeredRows& rows, const LayerIn
           for (size_t c = 0; c < 3 && layer.alpha > kLeastAlpha; ++c) colour[c] += q * layer.colour[c] / layer.alpha;
         }
         const uint64_t s = row.places[i];
-        for (size_t c = 0; c < 3; ++c) rgb[c][s] = std::min(alpha[s], 1.0f) * colour[c];
+        for (size_t c = 0; c < 3; ++c) rgb[c][s] = limited(double(std::min(alpha[s], 1.0f)) * double(colour[c]));
       }
     }
   });

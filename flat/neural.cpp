@@ -73,6 +73,11 @@ float clean(float value) {
   return std::max(finiteOrZero(value), 0.0f);
 }
 
+// What the network makes of light that was divided can be brighter than all light that there was.
+float bounded(float value) {
+  return value > 0 ? std::min(value, kLargest) : 0.0f;
+}
+
 // One light through the network, into planes of the result.
 class LightRun {
  public:
@@ -103,7 +108,8 @@ class LightRun {
       Buffer<float> sum(settled_.size());
       const Buffer<float>&diffuse = result.get(prefixOf(Light::Diffuse) + c).values,
             &specular = result.get(prefixOf(Light::Specular) + c).values, &render = noisy_.get(c).values;
-      for (size_t i = 0; i < sum.size(); ++i) sum[i] = settled_[i] ? clean(render[i]) : diffuse[i] + specular[i];
+      for (size_t i = 0; i < sum.size(); ++i)
+        sum[i] = settled_[i] ? clean(render[i]) : bounded(diffuse[i] + specular[i]);
       result.planes.push_back({c, std::move(sum)});
     }
   }
@@ -138,7 +144,7 @@ class LightRun {
       const float* from = exposed + size_t(y) * size_t(planes_.width());
       for (size_t x = 0; x < size_t(width); ++x) {
         const size_t i = size_t(y) * size_t(width) + x;
-        to[i] = clean(settled_[i] ? render[i] : from[x] * planes_.restoring(c, y, int(x)));
+        to[i] = settled_[i] ? clean(render[i]) : bounded(from[x] * planes_.restoring(c, y, int(x)));
       }
     });
   }

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "deep/flatten.h"
 #include "deep/layers_results.h"
+#include "flat/finite.h"
 #include "tests/reference/deep_samples.h"
 #include "tests/reference/layered.h"
 #include "tests/reference/noisy_frame.h"
@@ -180,6 +181,29 @@ TEST(Layers, RowsKnowTheBrightnessOfTheRenderAndOfTheResult) {
         ASSERT_NEAR(rows.brightness(y, x), mean(result), 1e-5f * (1 + mean(result))) << x << " " << y;
       }
   });
+}
+
+// Light on black surfaces, divided by next to nothing, and white ones beside them.
+TEST(Layers, WhatComesBackTimesAnAlbedoIsBounded) {
+  DeepImage image = reference::makeNoisyFrame(24, 16, 1);
+  const std::span<const float> alpha = image.get("A");
+  for (const std::string c : {"R", "G", "B"})
+    for (size_t s = 0; s < alpha.size(); ++s) {
+      image.get(c)[s] = image.get("diffuse." + c)[s] = alpha[s] * 9e14f;
+      image.get("specular." + c)[s] = 0;
+      image.get("albedo." + c)[s] = s % 3 ? 0 : alpha[s];
+    }
+  const Results found = run(image);
+  float most = 0;
+  for (size_t c = 0; c < 3; ++c)
+    for (const float v : found.flat.planes[c].values) {
+      ASSERT_TRUE(isFinite(v)) << v;
+      most = std::max(most, v);
+    }
+  EXPECT_EQ(most, kLargest);
+  for (const DeepImage* result : {&found.layers, &found.bins})
+    for (const char* c : {"R", "G", "B"})
+      for (const float v : result->get(c)) ASSERT_TRUE(isFinite(v)) << v;
 }
 
 TEST(Layers, MemoryDoesNotChangeTheResult) {

@@ -110,6 +110,24 @@ TEST(Neural, DiffuseLightComesBackTimesTheAlbedo) {
   EXPECT_FLOAT_EQ(planes.restoring(1, 0, 1) * planes.exposure(), 1);
 }
 
+// Light on black surfaces, divided by next to nothing, and white ones beside them.
+TEST(Neural, WhatComesBackTimesAnAlbedoIsBounded) {
+  Image noisy = withAlbedo(withAlpha(makeNoisyFlat(24, 16, 5).noisy));
+  for (const std::string c : kRgbNames) {
+    for (const std::string part : {"", "diffuse."}) noisy.find(part + c)->values.fill(9e14f);
+    Buffer<float>& albedo = noisy.find("albedo." + c)->values;
+    for (size_t i = 0; i < albedo.size(); ++i) albedo[i] = i % 3 ? 0 : 1;
+  }
+  const Image found = denoiseNeural(net(), {}, noisy);
+  float most = 0;
+  for (const Plane& plane : found.planes)
+    for (const float v : plane.values) {
+      ASSERT_TRUE(isFinite(v) && v >= 0) << plane.name << " " << v;
+      most = std::max(most, v);
+    }
+  EXPECT_EQ(most, kLargest);
+}
+
 TEST(Neural, ComponentsAddUp) {
   const Image found = denoiseNeural(net(), {}, withAlpha(makeNoisyFlat(20, 16, 2).noisy));
   ASSERT_EQ(found.planes.size(), 9U);
