@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -242,7 +241,7 @@ void LayerScaleSum::add(const DeepImage& rows, const LayerInputs& inputs) {
   const int height = rows.dataWindow.height(), width = rows.dataWindow.width();
   const size_t first = size_t(rows.dataWindow.y0 - dataWindow_.y0) * size_t(width), plane = dataWindow_.area();
   std::vector<double> depth(static_cast<size_t>(height), 0), weight(static_cast<size_t>(height), 0);
-  std::atomic<bool> diffuse = false, specular = false;
+  std::vector<std::array<bool, 2>> lit(static_cast<size_t>(height));  // by diffuse and by specular light
   parallelFor(0, height, [&](int y) {
     for (size_t pixel = size_t(y) * size_t(width); pixel < size_t(y + 1) * size_t(width); ++pixel) {
       std::array<double, 3> sum{};
@@ -251,8 +250,8 @@ void LayerScaleSum::add(const DeepImage& rows, const LayerInputs& inputs) {
           [&](uint64_t s, float w, float a) {
             for (size_t c = 0; c < 3; ++c) {
               sum[c] += double(w) * double(light.at(c, s) / a);
-              if (light.diffuseAt(c, s) != 0) diffuse = true;
-              if (light.specularAt(c, s) != 0) specular = true;
+              lit[size_t(y)][0] |= light.diffuseAt(c, s) != 0;
+              lit[size_t(y)][1] |= light.specularAt(c, s) != 0;
             }
             depth[size_t(y)] += double(w) * double(z[s]);
             weight[size_t(y)] += double(w);
@@ -262,7 +261,7 @@ void LayerScaleSum::add(const DeepImage& rows, const LayerInputs& inputs) {
     }
   });
   for (size_t y = 0; y < depth.size(); ++y) depth_ += depth[y], weight_ += weight[y];
-  diffuse_ |= diffuse, specular_ |= specular;
+  for (const auto& [diffuse, specular] : lit) diffuse_ |= diffuse, specular_ |= specular;
 }
 
 LayerScale LayerScaleSum::result() const {
