@@ -55,6 +55,7 @@ def main(path):
         "full": full,
         "whole-variance": without(full, "variance.diffuse", "variance.specular", "half"),
         "halves": without(full, "variance", "Z"),
+        "no-albedo": without(full, "albedo", "variance.albedo", "half"),
         "light": without(full, "variance", "half", "A", "albedo", "N.", "diffuse", "Z"),
         "black": {name: 0 * x for name, x in frame(random, 3, 5).items()},
     }

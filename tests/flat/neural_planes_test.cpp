@@ -56,7 +56,7 @@ void expectDivisor(const NeuralPlanes& planes, const nn::Tensor& expected) {
 
 TEST(NeuralPlanes, EqualTraining) {
   int compared = 0;
-  for (const char* name : {"full", "whole-variance", "halves", "light", "black"}) {
+  for (const char* name : {"full", "whole-variance", "halves", "no-albedo", "light", "black"}) {
     const Image image = storedImage(name);
     NeuralPlanes planes(image);
     for (const auto& [light, called] :
@@ -72,7 +72,7 @@ TEST(NeuralPlanes, EqualTraining) {
       ++compared;
     }
   }
-  EXPECT_EQ(compared, 14);
+  EXPECT_EQ(compared, 17);
 }
 
 // What is not finite is as good as 0, wherever it stands.
