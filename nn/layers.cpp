@@ -85,7 +85,7 @@ double LayersNet::flopPerPixel(double samples, int layers, int lights) const {
 
 double LayersNet::bandBytes(int layers, int lights) const {
   const double partition = double(bytesOf(element())) * kEmbedding, kernels = partition * (1 + 1 / 4.0 + 1 / 16.0);
-  const double sums = layers * sizeof(float) * (kEmbedding + kSplatted + kDivisors);
+  const double sums = layers * sizeof(float) * (kEmbedding + kMostSplatted);
   const double results = layers * sizeof(float) * kLayerPlanes;
   return lights * (sizeof(float) * kEmbedding + kernels + sums) + partition + results + 1;
 }

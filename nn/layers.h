@@ -21,7 +21,7 @@
 
 namespace fathom::nn {
 
-// What diffuse light is divided by: the albedo and this.
+// What diffuse light is divided by: the albedo and this. Larger than the flat network's, whose training knows the division.
 constexpr float kLeastAlbedo = 0.1f;
 
 // Planes of a row of samples: kSampleInputs inputs, as training has them, all finite; then what is splatted, R G B of the

@@ -18,8 +18,8 @@ namespace fathom::nn {
 class LayersBand {
  public:
   // Rows [rows.begin, rows.end) of a frame of height x width, all multiples of LayersNet::kAlignment; `layers` is 1, 2 or 4;
-  // tiles have at most `tile` pixels a side. Lights go through the network apart, in the layers that the first one makes: their
-  // colours are added, and what a layer covers is the mean. The net must outlive this.
+  // tiles have at most `tile` pixels a side. Lights go through the network apart, in the layers that the first one makes:
+  // their colours are added, and what a layer covers is the mean. The net must outlive this.
   LayersBand(const LayersNet& net, int height, int width, const Interval& rows, int layers,
              const std::vector<SampleLight>& lights, int tile);
 

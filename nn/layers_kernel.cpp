@@ -18,7 +18,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace fathom::nn {
 namespace HWY_NAMESPACE {
-constexpr size_t kMostSplatted = kSplatted + kDivisors;
 namespace hn = hwy::HWY_NAMESPACE;
 
 using D = hn::ScalableTag<float>;
@@ -216,8 +215,7 @@ void halveGroups(const float* from, int groups, int height, int width, int block
 
 void splat(const float* logits, int block, const WidePlanes& values, bool divided, WidePlanes& result,
            WidePlanes* shares) {
-  constexpr size_t kMost = kSplatted + kDivisors;
-  const size_t splatted = divided ? kMost : kSplatted, planes = splatted - 1;
+  const size_t splatted = divided ? kMostSplatted : kSplatted, planes = splatted - 1;
   constexpr int kRows = kKernelWidth, kReach = kKernelWidth / 2;
   const int height = values.height(), width = values.width();
   const size_t rowFloats = size_t(width) * size_t(block), groupStride = size_t(height) * rowFloats;
@@ -244,13 +242,13 @@ void splat(const float* logits, int block, const WidePlanes& values, bool divide
     const int y = made - kReach;
     if (!inside(y)) continue;
     const float* weights[kRows];
-    const float* rows[kRows][kMost] = {};
+    const float* rows[kRows][kMostSplatted] = {};
     for (int i = 0; i < kRows; ++i) {
       const int from = y + kReach - i;
       weights[i] = (inside(from) ? ring[size_t(from % kRows)] : none).data() + WidePlanes::kBorder;
       for (size_t p = 0; p < splatted; ++p) rows[i][p] = values.row(p, inside(from) ? from : y);
     }
-    float* to[kMost] = {};
+    float* to[kMostSplatted] = {};
     for (size_t p = 0; p < planes; ++p) to[p] = result.row(p, y);
     splatRow(weights, stride, rows, divided, size_t(width), to);
   }

@@ -16,6 +16,7 @@ namespace fathom::nn {
 constexpr size_t kSplatted = 6;     // R, G, B, weight, occupancy, depth, each times the weight but for the occupancy
 constexpr size_t kLayerPlanes = 5;  // R, G, B (premultiplied), alpha, depth times alpha
 constexpr size_t kDivisors = 3;     // behind both, where light is divided: R, G, B of what by, times weight or alpha
+constexpr size_t kMostSplatted = kSplatted + kDivisors;
 
 // Planes whose rows have zeros on both sides, and room for whole vectors on the right. Keeps its memory.
 class WidePlanes {
@@ -52,11 +53,11 @@ void layerShares(const float* logits, int block, size_t count, int layers, float
 // [groups][height][width][block] (sides even) to the mean of 2x2 pixels.
 void halveGroups(const float* from, int groups, int height, int width, int block, float* to);
 
-// Splats `values` (kSplatted planes with clear borders, and kDivisors if `divided`) with kernels exp(clamp(logit, -12, 12)) of 5x5 taps, row-major from
-// (-2, -2): what pixel q gives to q + d is weighed by tap d of q. Pixels beyond the borders do not exist. `result` gets
-// kLayerPlanes planes (and kDivisors): sums of colours, weights, depths (and divisors) over those of occupancies; alpha at
-// most 1. `logits`:
-// [groups][height][width][block]; for `shares` that are given, three more channels, whose softmax becomes its planes.
+// Splats `values` (kSplatted planes with clear borders, kMostSplatted if `divided`) with kernels exp(clamp(logit, -12,
+// 12)) of 5x5 taps, row-major from (-2, -2): what pixel q gives to q + d is weighed by tap d of q. Pixels beyond the
+// borders do not exist. `result` gets kLayerPlanes planes (and kDivisors): sums of colours, weights, depths (and divisors)
+// over those of occupancies; alpha at most 1. `logits`: [groups][height][width][block]; for `shares` that are given, three
+// more channels, whose softmax becomes its planes.
 void splat(const float* logits, int block, const WidePlanes& values, bool divided, WidePlanes& result,
            WidePlanes* shares);
 
