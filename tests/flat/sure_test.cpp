@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "tests/reference/noisy_flat.h"
 
 namespace fathom::flat {
@@ -200,6 +201,82 @@ TEST(Sure, TakesATellingDenoisersWord) {
     else
       EXPECT_FLOAT_EQ(e.error[1][i], residual * residual - noise.variance[1][i] + 2 * e.covariance[1][i]) << i;
   }
+}
+
+// A denoiser that multiplies, with a value to put into a pixel of the answer of one run; the step squared is the variance,
+// so that all is known without chance.
+struct Multiplies {
+  float factor;
+  int odd = -1;  // of the runs beside the first
+  float value = 0;
+
+  ErrorEstimate of(const Image& noisy, const SureParams& params) const {
+    int runs = 0;
+    const Denoiser denoiser = [&](const Image& image, const Progress&) {
+      Image result = image.copy();
+      for (const char* c : kRgbNames)
+        for (float& v : result.find(c)->values) v *= factor;
+      if (runs == odd + 1) result.find("R")->values[5] = value;
+      ++runs;
+      return result;
+    };
+    const Image denoised = denoiser(noisy, {});
+    return estimateError(noisy, noiseOf(noisy), denoised, denoiser, params);
+  }
+};
+
+Image constantImage(float value, float variance) {
+  Image image{{0, 0, 4, 3}, {0, 0, 4, 3}, {}, {}};
+  for (const char* c : kRgbNames) {
+    image.add(c, value);
+    image.add(std::string("variance.") + c, variance);
+  }
+  return image;
+}
+
+TEST(Sure, ARunThatFailsInAPixelSaysNothingThere) {
+  const Image noisy = constantImage(1, 0.25f);
+  for (const float odd : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e20f}) {
+    const ErrorEstimate e = Multiplies{0.5f, 1, odd}.of(noisy, {.probes = 2, .size = 0.5f});
+    for (size_t i = 0; i < 12; ++i) {
+      const float runs = i == 5 ? 0.5f : 1;
+      EXPECT_FLOAT_EQ(e.covariance[0][i], 0.5f * 0.25f * runs);
+      EXPECT_FLOAT_EQ(e.spread[0][i], 0.25f * 0.25f * runs);
+      EXPECT_FLOAT_EQ(e.error[0][i], 0.25f - 0.25f + 2 * e.covariance[0][i]);
+    }
+  }
+}
+
+TEST(Sure, WhatIsTooLargeToBeFiniteIsNotKnown) {
+  // The residual's square: the spread is all that is known.
+  const ErrorEstimate far = Multiplies{0.5f}.of(constantImage(1e8f, 1e12f), {.size = 0.5f});
+  // The spread, and with it the error.
+  const ErrorEstimate wide = Multiplies{1e6f}.of(constantImage(0, 1e6f), {.size = 0.5f});
+  for (size_t i = 0; i < 12; ++i) {
+    EXPECT_NEAR(far.spread[1][i], 0.25e12, 1e8);
+    EXPECT_EQ(far.error[1][i], far.spread[1][i]);
+    EXPECT_EQ(far.covariance[1][i], 0);
+    EXPECT_EQ(wide.spread[1][i], 0);
+    EXPECT_EQ(wide.error[1][i], -1e6f) << "of a residual of 0 the noise is taken";
+    EXPECT_EQ(wide.covariance[1][i], 0);
+  }
+}
+
+TEST(Sure, NoProbesAreOne) {
+  const Image noisy = makeNoisyFlat(9, 7, 1).noisy;
+  const ErrorEstimate none = estimate(noisy, boxDenoiser(), {.probes = 0}),
+                      one = estimate(noisy, boxDenoiser(), {.probes = 1});
+  for (size_t i = 0; i < 63; ++i) EXPECT_EQ(none.error[0][i], one.error[0][i]);
+  EXPECT_GT(sum(one.spread[0]), 0);
+}
+
+TEST(Sure, ADenoiserOfAnotherSizeIsRefused) {
+  const Image noisy = makeNoisyFlat(9, 7, 1).noisy, other = makeNoisyFlat(9, 6, 1).noisy;
+  const Noise noise = noiseOf(noisy);
+  const Denoiser identity = [](const Image& image, const Progress&) { return image.copy(); };
+  const Denoiser cuts = [&](const Image&, const Progress&) { return other.copy(); };
+  EXPECT_THROW(estimateError(noisy, noise, noisy, cuts), Error);
+  EXPECT_THROW(estimateError(noisy, noise, other, identity), Error);
 }
 
 TEST(Sure, StopsWhenTold) {
