@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "base/error.h"
@@ -17,6 +18,7 @@ namespace {
 constexpr float kFewestConverged = 4;  // camera samples
 
 constexpr int kDarkRadius = 2;
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 // One channel of a half: its own plane, or its components'.
 struct HalfChannel {
@@ -42,7 +44,7 @@ void fromHalves(const Image& image, Noise& noise) {
       fail("channel {}: expected variance.* or half0.* and half1.* to know its noise, found neither", kRgbNames[c]);
     for (size_t i = 0; i < noise.variance[c].size(); ++i) {
       const float m = n0 && n1 ? n0->values[i] : 1, n = n0 && n1 ? n1->values[i] : 1;
-      const float share = m > 0 && n > 0 ? m / (m + n) * (n / (m + n)) : 0;
+      const float share = m > 0 && n > 0 ? m / (m + n) * (n / (m + n)) : m > 0 || n > 0 ? kUnknown : 0;
       const float e = a.at(i) - b.at(i);
       noise.variance[c][i] = share * e * e;
     }

@@ -16,7 +16,7 @@ inline constexpr std::array<const char*, 3> kRgbNames{"R", "G", "B"};
 enum class PixelNoise : uint8_t {
   Known,
   Converged,  // variance 0 in all channels, from four camera samples or more: the render is the truth
-  Unknown,    // variance 0 from fewer, or a colour or variance is not finite
+  Unknown,    // variance 0 from fewer, only one half has samples, or a colour or variance is not finite
 };
 
 // All planes are of the image's data window.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "base/error.h"
@@ -93,6 +94,67 @@ TEST(Noise, KnowsConvergedAndUnknownPixels) {
   EXPECT_EQ(noiseOf(image).pixel[39], Known);
   for (const char* c : kRgbNames) image.find(c)->values[42] = 1;  // two pixels to the right
   EXPECT_EQ(noiseOf(image).pixel[40], Known);
+}
+
+// The two-buffer variance of each pixel's own counts. Where one half has no samples, nobody knows; where both have none there
+// is no noise.
+TEST(Noise, HalvesCountByTheirSamples) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float counts[][2] = {{8, 8}, {3, 13}, {1, 1e6f}, {0, 16}, {16, 0}, {0, 0}, {-1, 5}, {nan, 4}};
+  Image image{{0, 0, 8, 1}, {0, 0, 8, 1}, {}, {}};
+  for (const char* c : kRgbNames) {
+    image.add(c, 0.5f);
+    image.add(std::string("half0.") + c, 0.9f);
+    image.add(std::string("half1.") + c, 0.2f);
+  }
+  image.add("half0.samples");
+  image.add("half1.samples");
+  for (size_t i = 0; i < 8; ++i) {
+    image.find("half0.samples")->values[i] = counts[i][0];
+    image.find("half1.samples")->values[i] = counts[i][1];
+  }
+  const Noise noise = noiseOf(image);
+  for (size_t i = 0; i < 8; ++i) {
+    const double m = double(counts[i][0]), n = double(counts[i][1]);
+    const double expected = m > 0 && n > 0 ? m * n / (m + n) / (m + n) * 0.7 * 0.7 : 0;
+    EXPECT_NEAR(noise.variance[2][i], expected, 1e-6 * expected) << i;
+    EXPECT_EQ(noise.pixel[i], i < 3 ? PixelNoise::Known : i == 5 ? PixelNoise::Converged : PixelNoise::Unknown) << i;
+  }
+}
+
+// `samples` before fathom:spp; less than one sample, or no number, is one.
+TEST(Noise, SamplesAreWhatTheFileTells) {
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  Image image{{0, 0, 6, 1}, {0, 0, 6, 1}, {}, {}};
+  for (const char* c : kRgbNames) {
+    image.add(c, 1);
+    image.add(std::string("variance.") + c, 0.1f);
+  }
+  for (const float n : noiseOf(image).samples) EXPECT_EQ(n, 1);
+  image.attributes["fathom:spp"] = "32";
+  for (const float n : noiseOf(image).samples) EXPECT_EQ(n, 32);
+  const float counts[] = {7, 1.5f, 0.5f, -3, inf, nan}, expected[] = {7, 1.5f, 1, 1, 1, 1};
+  Buffer<float>& samples = image.add("samples").values;
+  std::copy_n(counts, 6, samples.begin());
+  const Noise noise = noiseOf(image);
+  for (size_t i = 0; i < 6; ++i) EXPECT_EQ(noise.samples[i], expected[i]) << i;
+}
+
+// No variance from how many samples: known to be none where nothing tells, or from four.
+TEST(Noise, StillIsConvergedFromFourSamples) {
+  Image image{{0, 0, 6, 1}, {0, 0, 6, 1}, {}, {}};
+  for (const char* c : kRgbNames) {
+    image.add(c, 1);
+    image.add(std::string("variance.") + c);
+  }
+  const auto pixel = [&](size_t i) { return noiseOf(image).pixel[i]; };
+  EXPECT_EQ(pixel(0), PixelNoise::Converged);
+  image.attributes["fathom:spp"] = "3";
+  EXPECT_EQ(pixel(0), PixelNoise::Unknown);
+  image.attributes["fathom:spp"] = "4";
+  EXPECT_EQ(pixel(0), PixelNoise::Converged);
+  image.add("samples", std::numeric_limits<float>::quiet_NaN());
+  EXPECT_EQ(pixel(0), PixelNoise::Unknown);
 }
 
 TEST(Noise, LevelIsTheMeanOfFiniteColours) {
