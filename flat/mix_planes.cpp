@@ -16,7 +16,7 @@ namespace fathom::flat {
 namespace {
 
 constexpr float kDark = 0.01f, kLeast = 1e-6f, kFloor = 1e-4f, kLargestResidual = 4;
-constexpr float kMostExposed = 1e15f;
+constexpr double kMostExposed = 1e15;
 
 using Triple = std::array<const float*, 3>;  // null: not there
 
@@ -33,13 +33,14 @@ float logarithm(float relative) {
   return (std::log(relative + kLeast) + 5) / 3;
 }
 
-float square(float x) {
+template <class Number>
+Number square(Number x) {
   return x * x;
 }
 
-// Exposed and within bounds.
-float exposed(float value, float scale) {
-  return std::clamp(finiteOrZero(value) * scale, -kMostExposed, kMostExposed);
+// Exposed and within bounds; the square of a dark frame's scale is no float.
+float exposed(float value, double scale) {
+  return float(std::clamp(double(finiteOrZero(value)) * scale, -kMostExposed, kMostExposed));
 }
 
 double meanDepth(const Plane* plane) {
@@ -57,7 +58,7 @@ class Source {
         candidates_(candidates),
         width_(noisy.dataWindow.width()),
         height_(noisy.dataWindow.height()),
-        scale_(exposureOf(noisy)),
+        scale_(double(exposureOf(noisy))),
         x_(find(noisy, "")),
         albedo_(find(noisy, "albedo.")),
         normal_(find(noisy, "N.", "XYZ")),
@@ -84,8 +85,8 @@ class Source {
         put(3 + c, albedo_[c] ? std::clamp(finiteOrZero(albedo_[c][i]), 0.0f, 1.0f) : 0);
         put(6 + c, normal_[c] ? std::clamp(finiteOrZero(normal_[c][i]), -1.0f, 1.0f) : 0);
       }
-      const float z = depth_ ? std::max(finiteOrZero(depth_->values[i]), 0.0f) / meanDepth_ : 0;
-      put(9, z / (z + 1));
+      const float z = depth_ ? std::max(finiteOrZero(depth_->values[i]), 0.0f) : 0;
+      put(9, z / (z + meanDepth_));
       put(10, logarithm(variance / 3 / (square(sum / 3) + kDark)));
       put(11, std::log2(noise_.samples[i]) / 4 - 1);
     });
@@ -140,7 +141,7 @@ class Source {
   const Noise& noise_;
   const std::span<const Candidate> candidates_;
   const int width_, height_;
-  const float scale_;
+  const double scale_;
   const Triple x_, albedo_, normal_;
   const Plane* depth_;
   const float meanDepth_;
