@@ -179,7 +179,7 @@ void NeuralPlanes::fillFeatures() {
         row(kNormalAt + c, y)[x] = normal.given() ? std::clamp(normal.at(c, i), -1.0f, 1.0f) : 0.0f;
       }
       const float z = depth ? std::max(finiteOrZero(depth->values[i]), 0.0f) : 0.0f;
-      row(kDepthAt, y)[x] = z > 0 ? z / (z + middle) : 0.0f;
+      row(kDepthAt, y)[x] = z / (z + middle);
       row(kAlphaAt, y)[x] = alpha ? finiteOrZero(alpha->values[i]) : 1.0f;
       row(kAlbedoNoiseAt, y)[x] =
           albedo.given() && albedoNoise.given() ? std::min(albedoNoise.deviation(i), 1.0f) : 0.0f;
