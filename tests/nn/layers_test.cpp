@@ -136,6 +136,20 @@ TEST(LayersNet, DenoisesLightsApart) {
   }
 }
 
+// Weights that come to more than all of a pixel, as rounded ones may: nothing is left, but not less.
+TEST(LayersNet, EqualsItsTwinWherePixelsAreMoreThanFull) {
+  const PlainWeights weights = randomLayered(16, 2);
+  const LayersNet net(fileOf(weights));
+  PlainSamples samples = randomSamples(12, 20, 4, 9);
+  for (size_t pixel = 0; pixel < samples.pixels.size(); pixel += 2)
+    for (PlainSample& sample : samples.pixels[pixel]) sample.inputs[16] *= 1.5;
+  for (const int layers : {1, 2, 4}) {
+    const std::vector<double> expected = valuesOf(LayeredTwin(weights).denoise(samples, layers));
+    EXPECT_LT(largestDifference(denoised(net, samples, layers), expected), 1e-4 * largest(expected))
+        << "L = " << layers;
+  }
+}
+
 TEST(LayersNet, IsCloseInBfloat16) {
   if (!machineHasBfloat16()) GTEST_SKIP() << "skipped: no bfloat16 on this processor";
   const PlainWeights weights = randomLayered(16, 1);

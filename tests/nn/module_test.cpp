@@ -156,90 +156,23 @@ TEST(Module, PlansAreSharedAndRunAtOnce) {
   for (const Volume& f : found) EXPECT_EQ(f.values, expected.values);
 }
 
-// No two rooms that are taken at the same time overlap, no value leaves its room, and rooms are shared.
-void checkMemory(const Graph& graph, int height, int width) {
-  const ElementSizes sizes = {16, 4};
-  const MemoryPlan plan = planMemory(graph, height, width, sizes, {});
-  size_t rooms = 0, values = 0;
-  for (size_t i = 0; i < plan.rooms.size(); ++i) {
-    const Room& a = plan.rooms[i];
-    rooms += a.bytes;
-    EXPECT_EQ(a.offset % 64, 0U);
-    EXPECT_LE(a.offset + a.bytes, plan.bytes);
-    for (size_t k = 0; k < i; ++k) {
-      const Room& b = plan.rooms[k];
-      const bool together = a.first <= b.last && b.first <= a.last;
-      const bool apart = a.offset + a.bytes <= b.offset || b.offset + b.bytes <= a.offset;
-      EXPECT_TRUE(!together || apart) << "rooms " << k << " and " << i;
-    }
-  }
-  for (size_t v = 0; v < graph.values().size(); ++v) {
-    const Graph::Info& info = graph.values()[v];
-    const MemoryPlan::Place& place = plan.places[v];
-    EXPECT_EQ(place.room < 0, info.input);
-    if (info.input) continue;
-    values += bytesOf(info, sizes, height, width);
-    EXPECT_LE(place.offset + bytesOf(info, sizes, height, width), plan.rooms[size_t(place.room)].bytes);
-  }
-  EXPECT_LT(plan.bytes, rooms);
-  EXPECT_LT(rooms, values);
-  EXPECT_LT(plan.bytes, values / 2);
-}
-
-TEST(MemoryPlan, SharesRoomAndNeverOverlaps) {
-  const WeightFile file = readWeights(reference::safetensors(reference::randomCompositional(16, 1)), "x");
-  WeightSource source(file);
-  checkMemory(decomposeGraph(source, 16).graph, 32, 48);
-  checkMemory(denoiseGraph(source, 16).graph, 32, 48);
-}
-
-// What is live at a layer, by the definition: written before or there, and read there or later.
-TEST(MemoryPlan, LiveValuesNeverLieOnOneAnother) {
-  const WeightFile file = readWeights(reference::safetensors(reference::randomCompositional(16, 1)), "x");
-  WeightSource source(file);
-  const Graph graph = decomposeGraph(source, 16).graph;
-  const ElementSizes sizes = {16, 4};
-  const MemoryPlan plan = planMemory(graph, 16, 16, sizes, {});
-  const auto& layers = graph.layers();
-  const auto livesAfter = [&](Value value, size_t i) {
-    if (graph.info(value).output) return true;
-    for (size_t k = i + 1; k < layers.size(); ++k) {
-      for (const Value& from : layers[k].from)
-        if (from.index == value.index) return true;
-      if (layers[k].conv.add.index == value.index) return true;
-    }
-    return false;
-  };
-  for (size_t i = 0; i < layers.size(); ++i) {
-    if (layers[i].kind == Graph::Kind::concat) continue;  // its parts lie in it
-    const size_t begin = plan.offsetOf(layers[i].to), end = begin + bytesOf(graph.info(layers[i].to), sizes, 16, 16);
-    for (size_t k = 0; k < i; ++k) {
-      const Value other = layers[k].to;
-      const bool read = std::ranges::find(layers[i].from, other.index, &Value::index) != layers[i].from.end();
-      if (!read && !livesAfter(other, i)) continue;
-      const size_t from = plan.offsetOf(other), to = from + bytesOf(graph.info(other), sizes, 16, 16);
-      EXPECT_TRUE(to <= begin || end <= from) << layers[i].name << " writes on " << layers[k].name;
-    }
-  }
-}
-
-// A term that is made early and added late lives until then, and nothing is added in place that is of another size.
-TEST(MemoryPlan, TermsLiveUntilTheyAreAdded) {
+// As many as a sequence of sizes may need; all go before there are more, but for those that somebody still has.
+TEST(Module, KeepsSixtyFourPlans) {
   PlainWeights weights;
-  for (const char* name : {"term", "a", "b", "sum"}) addConv(weights, name, 16, 16, 3, 1);
+  addConv(weights, "c", 16, 16, 1, 1);
   const WeightFile file = readWeights(reference::safetensors(weights), "x");
-  for (const bool floats : {false, true}) {
-    WeightSource source(file);
-    Graph graph;
-    const Value in = graph.input(16), term = graph.conv(source, "term", in, {.channels = 16});
-    const Value a = graph.conv(source, "a", in, {.channels = 16}), b = graph.conv(source, "b", a, {.channels = 16});
-    const Value sum = graph.conv(source, "sum", b, {.channels = 16, .add = term});
-    graph.output(sum, floats);
-    const MemoryPlan plan = planMemory(graph, 16, 16, {16, 2}, {});
-    const Room& room = plan.rooms[size_t(plan.places[size_t(term.index)].room)];
-    EXPECT_TRUE(room.first <= 0 && room.last >= 3);
-    EXPECT_EQ(plan.addsInPlace[3], !floats);
-  }
+  WeightSource source(file);
+  Graph graph;
+  graph.output(graph.conv(source, "c", graph.input(16), {.channels = 16, .kernel = 1}));
+  const Module module(std::move(graph));
+  std::vector<std::weak_ptr<const Plan>> plans;
+  for (int i = 1; i <= 64; ++i) plans.push_back(module.plan(i, 2));
+  for (const auto& plan : plans) EXPECT_FALSE(plan.expired());
+  const std::shared_ptr<const Plan> used = module.plan(5, 2);
+  EXPECT_EQ(used, plans[4].lock());
+  const auto last = module.plan(65, 2);
+  for (size_t i = 0; i < 64; ++i) EXPECT_EQ(plans[i].expired(), i != 4) << i;
+  EXPECT_EQ(module.plan(65, 2), last);
 }
 
 TEST(Graph, ReachesAsFarAsItsLayers) {
@@ -281,6 +214,20 @@ TEST(Graph, RefusesWhatItCannotRun) {
   EXPECT_THROW(graph.concat({c}), std::logic_error);
   const Module module(std::move(graph));
   EXPECT_THROW(module.plan(0, 4), std::logic_error);
+  EXPECT_THROW(module.plan(4, -4), std::logic_error);
+}
+
+TEST(Module, PlansAreOfAlignedSizes) {
+  PlainWeights weights;
+  addConv(weights, "down", 16, 16, 2, 1);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  graph.output(graph.conv(source, "down", graph.input(16), {.channels = 16, .kernel = 2, .stride = 2}));
+  const Module module(std::move(graph));
+  EXPECT_EQ(module.plan(4, 6)->width(), 6);
+  EXPECT_THROW(module.plan(4, 5), std::logic_error);
+  EXPECT_THROW(module.plan(5, 4), std::logic_error);
 }
 
 }  // namespace

@@ -5,6 +5,10 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
 
 #include "tests/reference/compositional.h"
 
@@ -156,6 +160,114 @@ TEST(TilePlan, ComponentsDoNotDependOnMemoryOrThreads) {
   EXPECT_EQ(expected, componentsWith(1));
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
   EXPECT_EQ(expected, componentsWith(0));
+}
+
+int widest(size_t memory, int side) {
+  int result = 0;
+  for (const Tile& tile : planTiles(net(), side, side, {.memory = memory}))
+    result = std::max(result, std::max(tile.window.width, tile.window.height));
+  return result;
+}
+
+// Eight at once while they have 256 pixels a side, one at least while they have 64.
+TEST(TilePlan, SidesGoByWhatFitsAtOnce) {
+  const auto bytes = [](int side) { return bytesOfTile(net(), {{0, 0, side, side}, 1}); };
+  EXPECT_EQ(widest(size_t(8.01 * bytes(512)), 512), 512);
+  EXPECT_EQ(widest(size_t(7.99 * bytes(512)), 512), 256);
+  EXPECT_EQ(widest(size_t(8.01 * bytes(288)), 288), 288);
+  EXPECT_EQ(widest(size_t(7.99 * bytes(288)), 288), 160);  // halves of 144, in steps of 32
+  EXPECT_EQ(widest(size_t(1.01 * bytes(256)), 256), 256);
+  EXPECT_EQ(widest(size_t(0.99 * bytes(256)), 256), 128);
+  EXPECT_EQ(widest(1, 64), 64);
+}
+
+// Random worths of 4 x 3 blocks, some of them without work, some with work in a part of them.
+struct Worths {
+  static constexpr int kAcross = 4, kDown = 3, kWide = kAcross * kBlock, kHigh = kDown * kBlock;
+  std::vector<BlockWorth> of;
+  TileParams params;
+
+  explicit Worths(unsigned seed) : params{.least = 1, .most = 4} {
+    std::mt19937 random(seed);
+    const auto below = [&](int most) { return int(random() % unsigned(most)); };
+    const int empty = below(10);
+    const double worth = 0.4 * below(4);
+    for (int i = 0; i < kAcross * kDown; ++i) {
+      BlockWorth& block = of.emplace_back();
+      block.work = below(10) >= empty;
+      const int x = i % kAcross * kBlock, y = i / kAcross * kBlock, dx = 4 * below(8), dy = 4 * below(8);
+      block.within = {x, y, kBlock, kBlock};
+      if (below(3) == 0) block.within = {x + dx, y + dy, 4 * (1 + below(8)), 4 * (1 + below(8))};
+      for (double& gain : block.gain) gain = worth * (below(1000) / 500.0 - 0.6);
+    }
+    params.least = seed % 5 == 1 ? 2 : 1;
+    params.most = seed % 5 == 2 ? 2 : seed % 5 == 3 ? 1 : 4;
+    params.least = std::min(params.least, params.most);
+  }
+  std::vector<Tile> planned() const {
+    return planTiles(net(), kHigh, kWide, params,
+                     [&](const Window& block) { return of[size_t(block.y / kBlock * kAcross + block.x / kBlock)]; });
+  }
+  // Of blocks [x0, x1) x [y0, y1) as one tile, in pixels of K = 1; nothing where there is no work.
+  double costOf(int x0, int y0, int x1, int y1, int components, Window& window) const {
+    int left = kWide, top = kHigh, right = 0, bottom = 0;
+    double gain = 0;
+    for (int y = y0; y < y1; ++y)
+      for (int x = x0; x < x1; ++x) {
+        const BlockWorth& block = of[size_t(y * kAcross + x)];
+        if (!block.work) continue;
+        const Window& w = block.within;
+        left = std::min(left, w.x), top = std::min(top, w.y);
+        right = std::max(right, w.x + w.width), bottom = std::max(bottom, w.y + w.height);
+        const double each = components == 1 ? 0 : components == 2 ? block.gain[0] : block.gain[1];
+        gain += each * w.width * w.height / params.gainPerPass;
+      }
+    window = {left, top, right - left, bottom - top};
+    if (right == 0) return 0;
+    return 2000 + net().flop(window, kHigh, kWide, components) / net().flopPerPixel(1) - gain;
+  }
+};
+
+// By trying all ways to cut.
+double leastCost(const Worths& worths, const std::array<int, 4>& at, std::map<std::array<int, 4>, double>& known) {
+  if (const auto found = known.find(at); found != known.end()) return found->second;
+  const auto [x0, y0, x1, y1] = at;
+  double best = std::numeric_limits<double>::infinity();
+  for (const int components : {1, 2, 4}) {
+    Window window;
+    if (components >= worths.params.least && components <= worths.params.most)
+      best = std::min(best, worths.costOf(x0, y0, x1, y1, components, window));
+  }
+  for (int x = x0 + 1; x < x1; ++x)
+    best = std::min(best, leastCost(worths, {x0, y0, x, y1}, known) + leastCost(worths, {x, y0, x1, y1}, known));
+  for (int y = y0 + 1; y < y1; ++y)
+    best = std::min(best, leastCost(worths, {x0, y0, x1, y}, known) + leastCost(worths, {x0, y, x1, y1}, known));
+  return known[at] = best;
+}
+
+TEST(TilePlan, IsTheCheapestThereIs) {
+  size_t cut = 0, one = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    const Worths worths(seed);
+    const std::vector<Tile> tiles = worths.planned();
+    double cost = 0;
+    for (const Tile& tile : tiles) {
+      const Window& w = tile.window;
+      Window window;
+      cost += worths.costOf(w.x / kBlock, w.y / kBlock, (w.x + w.width - 1) / kBlock + 1,
+                            (w.y + w.height - 1) / kBlock + 1, tile.components, window);
+      EXPECT_EQ(window.x, w.x);
+      EXPECT_EQ(window.width, w.width);
+      EXPECT_TRUE(tile.components >= worths.params.least && tile.components <= worths.params.most) << seed;
+    }
+    std::map<std::array<int, 4>, double> known;
+    const double expected = leastCost(worths, {0, 0, Worths::kAcross, Worths::kDown}, known);
+    EXPECT_NEAR(cost, expected, 1e-9 * std::fabs(expected)) << seed;
+    cut += tiles.size() > 1;
+    one += tiles.size() == 1;
+  }
+  EXPECT_GT(cut, 10u);
+  EXPECT_GT(one, 10u);
 }
 
 }  // namespace

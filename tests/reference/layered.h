@@ -110,11 +110,10 @@ class LayeredTwin {
         }
         result.shares.push_back(q);
       }
-      double before = 0;
-      for (Volume& layer : sums) {
-        layer.at(4, y, x) = 1 - before;
-        before += layer.at(3, y, x);
-      }
+      double all = 0;
+      for (const Volume& layer : sums) all += layer.at(3, y, x);
+      double reaching = std::max(0.0, 1 - all);  // what misses all layers
+      for (size_t l = sums.size(); l-- > 0;) sums[l].at(4, y, x) = reaching += sums[l].at(3, y, x);
     });
     for (int l = 0; l < layers; ++l) result.layers.push_back(filtered(sums[size_t(l)], embedding[size_t(l)], context));
     result.flat = composited(result.layers);
