@@ -17,7 +17,7 @@ namespace {
 
 constexpr BilateralParams kWindow{.radius = 5, .sigma = 2.5f, .sharpness = 2};
 constexpr float kFloor = 4e-4f;  // of the squared mean colour: 1e-4 where that is 0.5
-constexpr float kLargestGuide = 1e15f;
+constexpr float kLargestSquare = 1e30f;
 
 enum Quantity { kSure, kSpread, kVariance, kCovariance, kQuantities };
 
@@ -72,9 +72,8 @@ std::vector<Padded> noiseOfMeans(const Noise& noise, const Box& window, const Bi
   std::vector<Padded> squares, result = outputs(window, 3);
   for (const Buffer<float>& variance : noise.variance) {
     Buffer<float> square(variance.size());
-    // Doubles of what may be 1e15 do not fit; such noise is as unknown as any.
-    for (size_t i = 0; i < square.size(); ++i) square[i] = std::min(variance[i], 1e15f) * std::min(variance[i], 1e15f);
-    squares.push_back(padded(window, square, 2e30f));
+    for (size_t i = 0; i < square.size(); ++i) square[i] = variance[i] * variance[i];
+    squares.push_back(padded(window, square, kLargestSquare));
   }
   bilateralVariance(window.width(), window.height(), params, wanted, guide, squares, result);
   return result;
@@ -85,8 +84,8 @@ float shrunk(float sure, float spread, float variance, float noise, const Prior&
   const double p = prior.ratio * double(spread) + prior.rest * double(variance),
                n = noise >= FLT_MIN ? double(params.noiseFactor) * double(noise) : 0;
   const double weight = p * p + n;
-  const double error = weight > 0 ? (double(sure) * p * p + p * n) / weight : std::max(double(sure), 0.0);
-  return float(std::max(error, double(params.leastSpread) * double(std::max(spread, 0.0f))));
+  const double error = weight > 0 ? (double(sure) * p * p + p * n) / weight : double(sure);
+  return float(std::max(error, double(params.leastSpread) * double(spread)));
 }
 
 }  // namespace
@@ -96,9 +95,9 @@ ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Imag
   const Box& window = denoised.dataWindow;
   const size_t width = size_t(window.width());
   std::vector<Padded> guide;
-  for (const char* name : kRgbNames) guide.push_back(padded(window, denoised.get(name).values, kLargestGuide));
+  for (const char* name : kRgbNames) guide.push_back(padded(window, denoised.get(name).values, kLargest));
   BilateralParams bilateralParams = kWindow;
-  bilateralParams.floor = std::max(kFloor * noise.level * noise.level, 1e-30f);
+  bilateralParams.floor = kFloor * noise.level * noise.level;
   const Buffer<uint8_t> wanted(window.area(), 1);
   const Prior prior = priorOf(estimate, noise, params.mostRatio);
   const std::vector<Padded> noises = noiseOfMeans(noise, window, bilateralParams, wanted, guide);
@@ -107,7 +106,7 @@ ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Imag
     std::vector<Padded> in, out = outputs(window, kQuantities);
     for (const Buffer<float>* plane :
          {&estimate.error[c], &estimate.spread[c], &noise.variance[c], &estimate.covariance[c]})
-      in.push_back(padded(window, *plane, 1e30f));
+      in.push_back(padded(window, *plane, kLargestSquare));
     bilateral(window.width(), window.height(), bilateralParams, wanted, guide, in, out);
     for (auto* planes : {&map.error, &map.variance, &map.covariance}) (*planes)[c] = Buffer<float>(window.area());
     parallelFor(0, window.height(), [&](int y) {
@@ -118,7 +117,7 @@ ErrorMap mapErrors(const ErrorEstimate& estimate, const Noise& noise, const Imag
         map.error[c][i] =
             shrunk(out[kSure].row(y)[x], out[kSpread].row(y)[x], variance, noises[c].row(y)[x], prior, params);
         // No covariance is beyond what both variances allow.
-        const float most = std::sqrt(std::max(variance, 0.0f)) * std::sqrt(map.error[c][i]);
+        const float most = std::sqrt(variance) * std::sqrt(map.error[c][i]);
         map.covariance[c][i] = std::clamp(out[kCovariance].row(y)[x], 0.0f, most);
       }
     });

@@ -116,7 +116,7 @@ void Perturber::findAlbedo() {
     albedo_[c] = Buffer<float>(a.size());
     for (size_t i = 0; i < a.size(); ++i) {
       const float most = std::sqrt(ofAlbedo[i]) * std::sqrt(ofColour[i]);
-      const float correlation = most > 0 ? std::clamp(finiteOrZero(both[i] / most), -1.0f, 1.0f) : 0;
+      const float correlation = most > 0 ? std::clamp(both[i] / most, -1.0f, 1.0f) : 0;
       albedo_[c][i] = correlation * std::sqrt(variance[i]);
     }
   }

@@ -27,7 +27,7 @@ float doubt(float samples) {
 
 // How much of the denoised value is taken: equation 9, or all where both are equally good; its odds times `odds`.
 float shareOf(float error, float variance, float covariance, float odds) {
-  const float ours = odds * std::max(variance - covariance, 0.0f), theirs = std::max(error - covariance, 0.0f);
+  const float ours = odds * std::max(variance - covariance, 0.0f), theirs = error - covariance;
   return theirs > 0 ? ours / (ours + theirs) : 1.0f;
 }
 

@@ -25,7 +25,7 @@ void addProbe(const Image& noisy, const Image& denoised, const Image& moved, con
     parallelRanges(0, int(x.size()), kGrain, [&](int begin, int end) {
       for (size_t i = size_t(begin); i < size_t(end); ++i) {
         const float step = (xe[i] - x[i]) / size, response = (ye[i] - y[i]) / size;  // the step as rounded
-        if (!isFinite(step) || !isFinite(response)) continue;
+        if (!isFinite(response)) continue;
         sums.covariance[c][i] += step * response;
         sums.spread[c][i] += response * response;
       }

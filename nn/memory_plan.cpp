@@ -71,7 +71,7 @@ class Planner {
       }
     }
     const Value term = layer.conv.add;
-    if (!term.given() || info(term).input || info(term).output || hosts_[size_t(term.index)].value >= 0) return;
+    if (!term.given() || info(term).input || hosts_[size_t(term.index)].value >= 0) return;
     if (lives_[size_t(term.index)].last != i || layer.from.front().index == term.index) return;
     if (elementBytes(info(term), sizes_) != elementBytes(info(layer.to), sizes_)) return;
     hosts_[size_t(term.index)] = {layer.to.index, 0};
@@ -80,7 +80,7 @@ class Planner {
 
   void makeRooms() {
     std::vector<int> roomOf(hosts_.size(), -1);
-    for (size_t v = 0; v < hosts_.size(); ++v) {
+    for (size_t v = 0; v < hosts_.size(); ++v) {  // in the order of the layers that write them
       if (graph_.values()[v].input) continue;
       int host = int(v);
       size_t offset = 0;
@@ -91,7 +91,6 @@ class Planner {
         plan_.rooms.push_back({0, aligned(bytes({host})), lives_[v].first, lives_[v].last});
       }
       Room& room = plan_.rooms[size_t(index)];
-      room.first = std::min(room.first, lives_[v].first);
       room.last = std::max(room.last, lives_[v].last);
       plan_.places[v] = {index, offset};
     }

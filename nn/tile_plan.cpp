@@ -142,10 +142,11 @@ class Part {
     return best;
   }
 
+  // Of blocks that withWork gave: there is work on both sides.
   void tryCut(Blocks first, Blocks second, Way& best) {
     first = withWork(first);
     second = withWork(second);
-    const double cost = (first.empty() ? 0 : wayOf(first).cost) + (second.empty() ? 0 : wayOf(second).cost);
+    const double cost = wayOf(first).cost + wayOf(second).cost;
     if (cost < best.cost) best = {cost, 0, first, second};
   }
 
@@ -165,8 +166,8 @@ class Part {
       tiles.push_back({windowOf(blocks), way.components});
       return;
     }
-    if (!way.first.empty()) collect(way.first, tiles);
-    if (!way.second.empty()) collect(way.second, tiles);
+    collect(way.first, tiles);
+    collect(way.second, tiles);
   }
 
   const CompositionalNet& net_;

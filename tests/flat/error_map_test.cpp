@@ -127,7 +127,7 @@ TEST(ErrorMap, EqualsItsTwinWhateverTheProportions) {
 }
 
 TEST(ErrorMap, EqualsItsTwinForTheLeastAndTheLargestValues) {
-  for (const float size : {1e-26f, 1e-21f, 1e-17f, 1e-9f, 1e9f, 4e14f}) {
+  for (const float size : {1e-29f, 1e-21f, 1e-17f, 1e-9f, 1e9f, 4e14f}) {
     SCOPED_TRACE(size);
     HandMade(size, 0.2, 0.05).expect();
     HandMade(size, 0.01, 0.0005, 0.005).expect();
@@ -170,6 +170,25 @@ TEST(ErrorMap, OnlyWhatIsAbsurdDoesNotCountInTheFrame) {
       made.estimate.spread[c][kPixel] = spread;
     }
     made.expect(counts ? ~size_t(0) : kPixel);
+  }
+}
+
+// As they are where a caller makes them: what is no number counts as 0, and not in the frame.
+TEST(ErrorMap, AnEstimateThatIsNotFiniteIsNothing) {
+  constexpr size_t kPixel = 4 * 26 + 12;
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  for (const float odd : {inf, -inf, nan}) {
+    HandMade none(1, 0.2, 0.05), made(1, 0.2, 0.05);
+    for (size_t c = 0; c < 3; ++c) {
+      none.estimate.error[c][kPixel] = none.estimate.spread[c][kPixel] = none.estimate.covariance[c][kPixel] = 0;
+      made.estimate.error[c][kPixel] = made.estimate.spread[c][kPixel] = made.estimate.covariance[c][kPixel] = odd;
+    }
+    const ErrorMap expected = mapErrors(none.estimate, none.noise, none.denoised),
+                   found = mapErrors(made.estimate, made.noise, made.denoised);
+    for (size_t i = 0; i < none.denoised.dataWindow.area(); ++i) {
+      ASSERT_NEAR(found.error[1][i], expected.error[1][i], 0.01f * expected.error[1][i]) << odd << ", pixel " << i;
+      ASSERT_NEAR(found.covariance[1][i], expected.covariance[1][i], 1e-6f);
+    }
   }
 }
 
