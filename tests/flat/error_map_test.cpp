@@ -177,7 +177,7 @@ TEST(ErrorMap, OnlyWhatIsAbsurdDoesNotCountInTheFrame) {
 TEST(ErrorMap, AnEstimateThatIsNotFiniteIsNothing) {
   constexpr size_t kPixel = 4 * 26 + 12;
   const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
-  for (const float odd : {inf, -inf, nan}) {
+  for (const float odd : {inf, -inf, nan, 1e35f}) {
     HandMade none(1, 0.2, 0.05), made(1, 0.2, 0.05);
     for (size_t c = 0; c < 3; ++c) {
       none.estimate.error[c][kPixel] = none.estimate.spread[c][kPixel] = none.estimate.covariance[c][kPixel] = 0;

@@ -113,6 +113,22 @@ TEST(Perturb, AComponentWithoutNoiseStays) {
   }
 }
 
+// Halves of components whose means are not there: nothing tells which has the noise, so both move by half.
+TEST(Perturb, ComponentsOfHalvesAloneAddUp) {
+  Image noisy = plainFrame(5, 4);
+  for (const char* half : {"half0.", "half1."})
+    for (const char* group : {"", "diffuse.", "specular."})
+      for (const char* c : kRgbNames) noisy.add(fmt::format("{}{}{}", half, group, c), 0.2f);
+  const Noise noise = noiseOf(noisy);
+  const Image moved = Perturber(noisy, noise).moved(1, 0, 1);
+  for (size_t i = 0; i < 20; ++i)
+    for (const std::string half : {"half0.", "half1."}) {
+      const auto step = [&](const std::string& name) { return at(moved, half + name, i) - at(noisy, half + name, i); };
+      EXPECT_NEAR(step("diffuse.R"), step("R") / 2, 1e-6) << i;
+      EXPECT_NEAR(step("specular.R"), step("R") / 2, 1e-6) << i;
+    }
+}
+
 // Counts of each pixel: a half without samples stays, and its sign does not reach the other.
 TEST(Perturb, HalvesWithoutSamplesStay) {
   const float counts[][2] = {{3, 13}, {0, 16}, {16, 0}, {0, 0}, {16, -1}, {4, 4}};
