@@ -158,9 +158,9 @@ TEST(Layers, AllLightIsMultipliedByTheCurve) {
   }
 }
 
-TEST(Layers, RowsKnowTheBrightnessOfTheRenderAndOfTheResult) {
+// `lost`: a pixel of which a sample is not finite.
+void expectBrightness(const DeepImage& image, size_t lost) {
   static const nn::LayersNet net = randomNet();
-  const DeepImage image = reference::makeNoisyFrame(37, 30, 1);
   const flat::Image noisy = flatten(image);
   const LayerSource source = layerSource(image);
   LayerScale scale = measureLayers(source, {});
@@ -175,10 +175,26 @@ TEST(Layers, RowsKnowTheBrightnessOfTheRenderAndOfTheResult) {
         const auto mean = [i](const flat::Image& of) {
           return (of.get("R").values[i] + of.get("G").values[i] + of.get("B").values[i]) / 3;
         };
-        ASSERT_NEAR(rows.render[i], mean(noisy), 1e-4f * (1 + mean(noisy))) << x << " " << y;
+        ASSERT_EQ(std::isnan(rows.render[i]), i == lost) << x << " " << y;
+        if (i != lost) {
+          ASSERT_NEAR(rows.render[i], mean(noisy), 1e-4f * (1 + mean(noisy))) << x << " " << y;
+        }
         ASSERT_NEAR(rows.brightness(y, x), mean(result), 1e-5f * (1 + mean(result))) << x << " " << y;
       }
   });
+}
+
+TEST(Layers, RowsKnowTheBrightnessOfTheRenderAndOfTheResult) {
+  const DeepImage image = reference::makeNoisyFrame(37, 30, 1);
+  expectBrightness(image, image.pixels());
+  // With samples that only shine, and one that is lost.
+  DeepImage odd = image.copy();
+  for (size_t s = 0; s < odd.samples(); s += 7) odd.get("A")[s] = 0;
+  expectBrightness(odd, odd.pixels());
+  size_t pixel = 0;
+  while (odd.offsets[pixel + 1] <= 300) ++pixel;
+  for (const char* name : {"R", "diffuse.R"}) odd.get(name)[300] = std::numeric_limits<float>::infinity();
+  expectBrightness(odd, pixel);
 }
 
 // Light on black surfaces, divided by next to nothing, and white ones beside them.

@@ -107,6 +107,20 @@ TEST(FlatGate, BehindADenoiserItMovesComponentsLikeTheirSum) {
   EXPECT_GT(moved, 0.05);
 }
 
+TEST(FlatGate, ComponentsThatAreNotFiniteAreNotTakenBack) {
+  NoisyFlat frame = makeNoisyFlat(20, 10, 1, 0.02f);
+  const Denoiser dark = [&](const Image&, const Progress&) {
+    Image image = damaged(frame, 0.3f);
+    image.add("diffuse.G", 0.25f);
+    return image;
+  };
+  frame.noisy.find("diffuse.G")->values[77] = std::numeric_limits<float>::quiet_NaN();
+  const Image result = withGate(dark)(frame.noisy, {});
+  EXPECT_EQ(result.get("diffuse.G").values[77], 0.25f);
+  EXPECT_NE(result.get("diffuse.G").values[78], 0.25f);
+  EXPECT_GT(result.get("G").values[77], damaged(frame, 0.3f).get("G").values[77]);
+}
+
 TEST(FlatGate, BehindADenoiserItLeavesFramesThatSayNothingOfTheirNoise) {
   NoisyFlat frame = makeNoisyFlat(8, 6, 1, 0.02f);
   std::erase_if(frame.noisy.planes, [](const Plane& plane) { return plane.name.size() > 1; });

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -181,6 +182,47 @@ TEST(Light, SettledPixelsStay) {
     changed += factors[i] > 1.03f;
   }
   EXPECT_GT(changed, size_t(1000));
+}
+
+// One pixel says nothing of what the others lack, whatever its residual.
+TEST(Light, AbsurdPixelsDoNotCount) {
+  const Frame frame = noisyFrame(8, 0.05);
+  const Buffer<float> wanted = frame.factors();
+  for (const float value : {1e7f, -1e7f, 1e14f}) {
+    Frame odd = frame;
+    for (size_t c = 0; c < 3; ++c) odd.render[c][500] = value;
+    const Buffer<float> factors = odd.factors();
+    ASSERT_FALSE(factors.empty()) << value;
+    for (size_t i = 0; i < wanted.size(); ++i) ASSERT_NEAR(factors[i], wanted[i], 2e-3f) << value << ", pixel " << i;
+  }
+}
+
+// Both ways, by no more than a quarter; what is darker than all octaves goes by the last of them.
+TEST(Light, FactorsEndAtAQuarterAndBelowTheOctaves) {
+  for (const float level : {1.0f, 1e-9f})
+    for (const float render : {0.5f, 0.9f, 1.1f, 3.0f}) {
+      LightCurve curve(1);
+      for (int i = 0; i < 1000; ++i) curve.add(level, level * (render + (i % 2 ? 0.01f : -0.01f)));
+      curve.fit();
+      const float expected = std::clamp(render, 0.75f, 1.25f);
+      EXPECT_NEAR(curve.factor(level), expected, 0.006f) << level << ", " << render;  // but for the tolerance
+      EXPECT_NEAR(curve.factor(1e-12f), level == 1 ? 1 : expected, 0.006f) << level << ", " << render;
+      EXPECT_EQ(curve.factor(1e12f), 1);
+    }
+}
+
+TEST(Light, LightThatComesBackIsStillFinite) {
+  Image noisy{{0, 0, 20, 20}, {0, 0, 20, 20}, {}, {}}, denoised = noisy.copy();
+  for (const char* c : {"R", "G", "B"}) {
+    noisy.add(c, 9.9e14f);
+    denoised.add(c, 8e14f);
+    denoised.add(std::string("diffuse.") + c, 9.5e14f);
+    denoised.add(std::string("specular.") + c, -9.5e14f);
+  }
+  keepLight(noisy, std::vector<uint8_t>(400, 0), denoised, 9e14f);
+  EXPECT_GT(denoised.get("G").values[7], 9e14f);
+  EXPECT_EQ(denoised.get("diffuse.G").values[7], 1e15f);
+  EXPECT_EQ(denoised.get("specular.G").values[7], -1e15f);
 }
 
 TEST(Light, ScaledFramesAreTreatedAlike) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -128,6 +129,22 @@ TEST(Neural, WhatComesBackTimesAnAlbedoIsBounded) {
   EXPECT_EQ(most, kLargest);
 }
 
+// The same of so few pixels that their light is not kept.
+TEST(Neural, TheSumOfComponentsIsBounded) {
+  Image noisy = withAlbedo(withAlpha(makeNoisyFlat(8, 8, 5).noisy));
+  for (const std::string c : kRgbNames)
+    for (const std::string part : {"", "diffuse.", "specular."}) {
+      noisy.find(part + c)->values.fill(9e14f);
+      Buffer<float>& albedo = noisy.find("albedo." + c)->values;
+      for (size_t i = 0; i < albedo.size(); ++i) albedo[i] = i % 3 ? 0 : 1;
+    }
+  const Image found = denoiseNeural(net(), {}, noisy);
+  float diffuse = 0;
+  for (const float v : found.get("diffuse.G").values) diffuse = std::max(diffuse, v);
+  EXPECT_EQ(diffuse, kLargest);
+  for (const float v : found.get("G").values) EXPECT_EQ(v, kLargest);
+}
+
 TEST(Neural, ComponentsAddUp) {
   const Image found = denoiseNeural(net(), {}, withAlpha(makeNoisyFlat(20, 16, 2).noisy));
   ASSERT_EQ(found.planes.size(), 9U);
@@ -176,6 +193,32 @@ TEST(Neural, ConvergedAndEmptyPixelsKeepTheRender) {
 }
 
 // Skipped tiles change nothing but the time.
+// Each of them is denoised: noise that is not known, black that is covered, light that is not, one channel of it.
+TEST(Neural, WhatIsNotSettledIsDenoised) {
+  Image noisy = withoutComponents(withAlpha(makeNoisyFlat(24, 16, 1).noisy));
+  noisy.find("variance.G")->values[30] = std::numeric_limits<float>::quiet_NaN();
+  for (const char* c : kRgbNames) noisy.find(c)->values[100] = 0;
+  noisy.find("A")->values[200] = noisy.find("A")->values[300] = 0;
+  noisy.find("R")->values[300] = 0;
+  const Image found = denoiseNeural(net(), {}, noisy);
+  for (const size_t i : {30U, 100U, 200U, 300U}) EXPECT_NE(found.get("G").values[i], noisy.get("G").values[i]) << i;
+}
+
+// The whole render where it has converged, though its components are not all of it.
+TEST(Neural, SettledPixelsAreTheWholeRender) {
+  Image noisy = withAlpha(makeNoisyFlat(24, 16, 1).noisy);
+  for (const std::string c : kRgbNames) {
+    noisy.find("variance." + c)->values[50] = 0;
+    noisy.find(c)->values[50] = 0.7f;
+    noisy.find("diffuse." + c)->values[50] = 0.2f;
+    noisy.find("specular." + c)->values[50] = std::numeric_limits<float>::quiet_NaN();
+  }
+  const Image found = denoiseNeural(net(), {}, noisy);
+  EXPECT_EQ(found.get("G").values[50], 0.7f);
+  EXPECT_EQ(found.get("diffuse.G").values[50], 0.2f);
+  EXPECT_EQ(found.get("specular.G").values[50], 0);
+}
+
 TEST(Neural, TilesWithoutNoiseAreSkipped) {
   const Image noisy = withAlpha(makeNoisyFlat(512, 64, 6).noisy);
   Image half = noisy.copy();
@@ -246,6 +289,11 @@ TEST(Neural, MemoryIsCounted) {
   EXPECT_GT(free, pixels * 500);
   EXPECT_LT(neuralBytes(net(), {.components = 4, .memory = 50'000'000}, pixels), free / 2);
   EXPECT_LT(neuralBytes(net(), {.components = 1}, pixels), free);
+  // However little there may be, one tile of 64 pixels a side and its halo is held; and no more than what there is to do.
+  const double halo = 2.0 * net().halo(4), tile = net().bytesPerPixel(4) * (64 + halo) * (64 + halo);
+  EXPECT_EQ(neuralBytes(net(), {.components = 4, .memory = 1}, pixels),
+            neuralBytes(net(), {.components = 4, .memory = size_t(tile)}, pixels));
+  EXPECT_EQ(neuralBytes(net(), {.components = 4, .memory = size_t(1) << 40}, pixels), free);
 }
 
 }  // namespace

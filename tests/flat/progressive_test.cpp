@@ -451,5 +451,23 @@ TEST(ErrorSummary, IsTheMeanOfRelativeErrorsByFrameAndTile) {
   EXPECT_NEAR(summary.render, 0.1, 1e-4);
 }
 
+// What is no number is passed over, whole tiles of it too.
+TEST(ErrorSummary, StepsOverWhatIsNotFinite) {
+  Image image{{0, 0, 128, 4}, {0, 0, 128, 4}, {}, {}};
+  for (const char* c : kRgbNames) {
+    image.add(c, 0.3f);
+    image.add(std::string("variance.") + c, 0.01f);
+    Buffer<float>& error = image.add(std::string("error.") + c, 0.001f).values;
+    for (size_t i = 0; i < error.size(); ++i)
+      if (i % 128 >= 64 || i == 5) error[i] = i % 2 ? std::numeric_limits<float>::quiet_NaN() : 1e20f;
+  }
+  const ErrorSummary summary = summarizeErrors(image, noiseOf(image));
+  ASSERT_EQ(summary.tiles.size(), 2u);
+  EXPECT_NEAR(summary.tiles[0].relMse, 0.01, 1e-7);
+  EXPECT_EQ(summary.tiles[1].relMse, 0);
+  EXPECT_NEAR(summary.relMse, 0.01, 1e-7);
+  EXPECT_NEAR(summary.render, 0.1, 1e-6);
+}
+
 }  // namespace
 }  // namespace fathom::flat
