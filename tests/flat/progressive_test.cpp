@@ -6,13 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
 
 #include "base/error.h"
-#include "flat/error_summary.h"
 #include "tests/reference/mix_net.h"
 #include "tests/reference/noisy_flat.h"
 
@@ -41,103 +39,6 @@ Denoiser biased(float damage) {
       for (float& v : plane.values) v *= 1 - damage;
     return result;
   };
-}
-
-// A map and what else the mix takes of each pixel, all filled with different values.
-struct MapOf {
-  ErrorMap map;
-  Buffer<float> k;
-
-  explicit MapOf(size_t pixels) : k(pixels) {
-    for (size_t c = 0; c < 3; ++c)
-      for (auto* planes : {&map.error, &map.variance, &map.covariance}) (*planes)[c] = Buffer<float>(pixels);
-    for (size_t i = 0; i < pixels; ++i) {
-      k[i] = float(i % 4) / 4;
-      for (size_t c = 0; c < 3; ++c) {
-        map.error[c][i] = 1e-3f * float(i);
-        map.variance[c][i] = 4e-3f * float(i % 6);
-        map.covariance[c][i] = 1e-3f * float(i % 3);
-      }
-    }
-  }
-};
-
-// Equations 9 and 8 with the departures of the header. `odds`: how many times as likely the denoised value is made.
-void expectMix(const Image& noisy, const Noise& noise, const Image& denoised, const MapOf& of,
-               const Buffer<float>& odds, const std::function<double(size_t)>& factor) {
-  const Image result = mix(noisy, noise, denoised, of.map, of.k, odds);
-  for (size_t i = 0; i < of.k.size(); ++i)
-    for (size_t c = 0; c < 3; ++c) {
-      const double e = double(of.map.error[c][i]), v = double(of.map.variance[c][i]),
-                   f = double(of.map.covariance[c][i]);
-      const double n = double(noise.samples[i]), doubt = n > 1 ? (n + 11) / (n - 1) : 1;
-      const double s = doubt * std::max(v, double(noise.variance[c][i]));
-      const double ours = factor(i) * std::max(s - f, 0.0), theirs = std::max(e - f, 0.0);
-      const double a = std::min(theirs > 0 ? ours / (ours + theirs) : 1, 1 - double(of.k[i]) / doubt);
-      const double x = double(noisy.get(kRgbNames[c]).values[i]), y = double(denoised.get(kRgbNames[c]).values[i]);
-      EXPECT_NEAR(result.get(kRgbNames[c]).values[i], x + a * (y - x), 1e-5) << i;
-      EXPECT_NEAR(result.get(std::string("error.") + kRgbNames[c]).values[i],
-                  std::max(0.0, (1 - a) * (1 - a) * v + a * a * e + 2 * a * (1 - a) * f), 1e-6);
-    }
-}
-
-TEST(Progressive, MixesByEquation9) {
-  const NoisyFlat frame = makeNoisyFlat(7, 5, 1, 0.1f);
-  const Image denoised = reference::boxMean(frame.noisy);
-  MapOf of(35);
-  const auto same = [](size_t) { return 1.0; };
-  expectMix(frame.noisy, noiseOf(frame.noisy), denoised, of, {}, same);
-  // Covariances larger than the variances and errors, less than nothing, and between both.
-  for (size_t i = 0; i < 35; ++i) {
-    of.map.covariance[0][i] = 0.1f;
-    of.map.covariance[1][i] = -0.02f;
-    of.map.covariance[2][i] = 0.025f;
-  }
-  expectMix(frame.noisy, noiseOf(frame.noisy), denoised, of, {}, same);
-}
-
-TEST(Progressive, FewSamplesAreDoubted) {
-  NoisyFlat frame = makeNoisyFlat(7, 5, 1, 0.1f);
-  const float counts[] = {0, 1, 1.25f, 1.5f, 2, 3, 8, 32, 1e6f};
-  Buffer<float>& samples = frame.noisy.add("samples").values;
-  for (size_t i = 0; i < 35; ++i) samples[i] = counts[i % 9];
-  expectMix(frame.noisy, noiseOf(frame.noisy), reference::boxMean(frame.noisy), MapOf(35), {},
-            [](size_t) { return 1.0; });
-}
-
-TEST(Progressive, OddsTiltTheShareUpToABound) {
-  const NoisyFlat frame = makeNoisyFlat(7, 5, 1, 0.1f);
-  Buffer<float> odds(35);
-  for (size_t i = 0; i < 35; ++i) odds[i] = 0.25f * (float(i) - 17);
-  expectMix(frame.noisy, noiseOf(frame.noisy), reference::boxMean(frame.noisy), MapOf(35), odds,
-            [](size_t i) { return std::exp(std::clamp(0.25 * (double(i) - 17), -2.0, 2.0)); });
-}
-
-// Beside a render of 1e12 a difference would leave nothing of it.
-TEST(Progressive, AllOfTheDenoisedValueIsThatValue) {
-  NoisyFlat frame = makeNoisyFlat(4, 3, 1, 0.1f);
-  const Image denoised = reference::boxMean(frame.noisy);
-  for (const char* c : kRgbNames) frame.noisy.find(c)->values.fill(1e12f);
-  MapOf of(12);
-  of.k.fill(0);
-  for (Buffer<float>& error : of.map.error) error.fill(0);
-  const Image result = mix(frame.noisy, noiseOf(frame.noisy), denoised, of.map, of.k);
-  for (size_t i = 0; i < 12; ++i) EXPECT_EQ(result.get("G").values[i], denoised.get("G").values[i]);
-}
-
-TEST(Progressive, WhatIsNotMixedHasTheErrorOfWhatStandsThere) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  NoisyFlat frame = makeNoisyFlat(4, 3, 1, 0.1f);
-  Image denoised = reference::boxMean(frame.noisy);
-  frame.noisy.find("R")->values[3] = nan;                                                         // the render, in R
-  denoised.find("G")->values[5] = nan;                                                            // the denoiser, in G
-  for (const char* c : kRgbNames) frame.noisy.find(std::string("variance.") + c)->values[7] = 0;  // converged
-  const MapOf of(12);
-  const Image result = mix(frame.noisy, noiseOf(frame.noisy), denoised, of.map, of.k);
-  EXPECT_EQ(result.get("error.R").values[3], of.map.error[0][3]);
-  EXPECT_EQ(result.get("error.G").values[3], of.map.error[1][3]);
-  EXPECT_EQ(result.get("error.G").values[5], frame.noisy.get("variance.G").values[5]);
-  EXPECT_EQ(result.get("error.G").values[7], 0);
 }
 
 TEST(Progressive, IsNoWorseThanTheRenderNorTheDenoiser) {
@@ -208,113 +109,6 @@ TEST(Progressive, ANetworkThatSaysNothingChangesNothing) {
   }
 }
 
-Candidate flatCandidate(const Box& window, float value, float error) {
-  Candidate candidate{{window, window, {}, {}}, {}, {}, {}};
-  for (size_t c = 0; c < 3; ++c) {
-    candidate.denoised.add(kRgbNames[c], value);
-    candidate.map.error[c] = Buffer<float>(window.area(), error);
-    candidate.map.variance[c] = Buffer<float>(window.area(), 1e6f);  // a render that does not count
-    candidate.map.covariance[c] = Buffer<float>(window.area(), 0.0f);
-    candidate.spread[c] = Buffer<float>(window.area(), error);
-  }
-  candidate.k = Buffer<float>(window.area(), 0.0f);
-  return candidate;
-}
-
-TEST(Progressive, CandidatesWeighByTheirErrorsInAnyOrder) {
-  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.5f);
-  const Noise noise = noiseOf(frame.noisy);
-  const Box& window = frame.noisy.dataWindow;
-  std::vector<Candidate> some;
-  some.push_back(flatCandidate(window, 0.4f, 0.01f));
-  some.push_back(flatCandidate(window, 0.5f, 0.02f));
-  some.push_back(flatCandidate(window, 0.6f, 0.04f));
-  const Image one = mixCandidates(frame.noisy, noise, some);
-  std::swap(some[0], some[2]);
-  const Image other = mixCandidates(frame.noisy, noise, some);
-  const double mean = (0.4 + 0.5 / 4 + 0.6 / 16) / (1 + 1.0 / 4 + 1.0 / 16);
-  const Buffer<float> k = gate(frame.noisy, noise, [&] {
-    Image image{window, window, {}, {}};
-    for (const char* name : kRgbNames) image.add(name, float(mean));
-    return image;
-  }());
-  for (size_t i = 0; i < window.area(); ++i) {
-    ASSERT_NEAR(one.get("G").values[i], other.get("G").values[i], 1e-5);
-    const double x = double(frame.noisy.get("G").values[i]),
-                 doubt = double(noise.samples[i] + 11) / double(noise.samples[i] - 1);
-    const double share = noise.samples[i] > 1 ? 1 - double(k[i]) / doubt : 1 - double(k[i]);
-    ASSERT_NEAR(one.get("G").values[i], x + share * (mean - x), 2e-4) << i;
-    // The mean error less the candidates' spread about their mean, which here is beyond what independent errors leave.
-    const double error = (0.01 + 0.02 / 4 + 0.04 / 16) / (21.0 / 16),
-                 square = (0.16 + 0.25 / 4 + 0.36 / 16) / (21.0 / 16);
-    if (k[i] == 0) {
-      ASSERT_NEAR(one.get("error.G").values[i], error - (square - mean * mean), 1e-4);
-    }
-  }
-}
-
-TEST(Progressive, ACandidateWithoutErrorIsTaken) {
-  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.5f);
-  const Noise noise = noiseOf(frame.noisy);
-  std::vector<Candidate> some;
-  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0));
-  some[0].k = gate(frame.noisy, noise, some[0].denoised);
-  const Image one = mixCandidates(frame.noisy, noise, some);
-  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.8f, 0.01f));
-  const Image two = mixCandidates(frame.noisy, noise, some);
-  for (size_t i = 0; i < 96; ++i) ASSERT_NEAR(two.get("G").values[i], one.get("G").values[i], 1e-5);
-}
-
-// The merged candidate: neither a render that does not count nor the gate changes it.
-Image mixOf(const std::vector<std::pair<float, float>>& valuesAndErrors) {
-  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.5f);
-  std::vector<Candidate> some;
-  for (const auto& [value, error] : valuesAndErrors)
-    some.push_back(flatCandidate(frame.noisy.dataWindow, value, error));
-  ProgressiveParams params;
-  params.gate.threshold = 1e30f;
-  return mixCandidates(frame.noisy, noiseOf(frame.noisy), some, params);
-}
-
-TEST(Progressive, TheLeastErrorsWeighToo) {
-  const Image result = mixOf({{0.4f, 1e-24f}, {0.5f, 2e-24f}});
-  for (const float v : result.get("G").values) EXPECT_NEAR(v, (0.4 + 0.5 / 4) / 1.25, 1e-6);
-}
-
-// Nothing apart, but for how squares are rounded: the error is that of the mean, and no less than if errors were independent.
-TEST(Progressive, CandidatesThatAgreeHaveTheirMeanError) {
-  const double w = 9.0 / 10, v = 1.0 / 10;
-  for (int j = 0; j < 16; ++j) {
-    const float value = 0.3f + 0.07f * float(j);
-    const Image result = mixOf({{value, 1e-10f}, {value, 3e-10f}});
-    for (const float error : result.get("error.G").values) {
-      EXPECT_LE(error, 1.001 * (w * 1e-10 + v * 3e-10)) << value;
-      EXPECT_GE(error, 0.999 * (w * w * 1e-10 + v * v * 3e-10)) << value;
-    }
-  }
-}
-
-// Farther apart than their errors, and so far that the distance is beyond what counts as a number.
-TEST(Progressive, CandidatesThatDisagreeHaveTheErrorOfIndependentOnes) {
-  const Image apart = mixOf({{0.2f, 0.01f}, {0.8f, 0.01f}}), far = mixOf({{1e10f, 0.01f}, {-1e10f, 0.01f}});
-  for (const float error : apart.get("error.G").values) EXPECT_NEAR(error, 0.005, 1e-6);
-  for (const float error : far.get("error.G").values) EXPECT_NEAR(error, 0.01, 1e-6);
-}
-
-TEST(Progressive, WithoutAFiniteCandidateTheRenderStays) {
-  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.1f);
-  std::vector<Candidate> some;
-  for (int n = 0; n < 2; ++n) {
-    some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
-    some.back().denoised.find("G")->values.fill(std::numeric_limits<float>::quiet_NaN());
-  }
-  const Image result = mixCandidates(frame.noisy, noiseOf(frame.noisy), some);
-  for (size_t i = 0; i < 96; ++i) {
-    EXPECT_EQ(result.get("G").values[i], frame.noisy.get("G").values[i]);
-    EXPECT_EQ(result.get("error.G").values[i], frame.noisy.get("variance.G").values[i]);
-  }
-}
-
 // What the network's mix lacks comes back, by the brightness of the frame, but not to what is converged.
 TEST(Progressive, LightComesBackAtAnyExposure) {
   NoisyFlat frame = makeNoisyFlat(64, 48, 1, 0.2f);
@@ -351,21 +145,6 @@ TEST(Progressive, LightComesBackAtAnyExposure) {
     ASSERT_NEAR(dim.get("G").values[i] * 0x1p24f, result.get("G").values[i], 1e-3);
   }
   EXPECT_NEAR(light / truth, 0.99, 0.01);
-}
-
-TEST(Progressive, ACandidateThatIsNotFiniteDoesNotCount) {
-  const NoisyFlat frame = makeNoisyFlat(12, 8, 1, 0.1f);
-  const Noise noise = noiseOf(frame.noisy);
-  std::vector<Candidate> some;
-  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
-  some.push_back(flatCandidate(frame.noisy.dataWindow, 0.4f, 0.01f));
-  for (Candidate& candidate : some) candidate.k = gate(frame.noisy, noise, candidate.denoised);
-  some[1].denoised.find("G")->values.fill(std::numeric_limits<float>::infinity());
-  const Image two = mixCandidates(frame.noisy, noise, some);
-  some.pop_back();
-  const Image one = mixCandidates(frame.noisy, noise, some);
-  for (const char* name : {"R", "G", "B"})
-    for (size_t i = 0; i < 96; ++i) ASSERT_NEAR(two.get(name).values[i], one.get(name).values[i], 1e-5);
 }
 
 TEST(Progressive, ConvergedPixelsAreTheRenderItself) {
@@ -426,47 +205,6 @@ TEST(Progressive, ProgressNeverFallsAndEndsAtOne) {
                         },
                         {}});
   EXPECT_EQ(last, 1);
-}
-
-TEST(ErrorSummary, IsTheMeanOfRelativeErrorsByFrameAndTile) {
-  Image image{{10, 20, 110, 90}, {0, 0, 200, 100}, {}, {}};
-  for (const char* c : kRgbNames) {
-    image.add(c, 0.3f);
-    image.add(std::string("error.") + c, 0.001f);
-    image.add(std::string("variance.") + c, 0.01f);
-  }
-  for (int y = 84; y < 90; ++y)
-    for (int x = 74; x < 110; ++x)
-      for (const char* c : kRgbNames)
-        image.find(std::string("error.") + c)->values[image.dataWindow.index(x, y)] = 0.1f;
-  image.find("R")->values[0] = std::numeric_limits<float>::quiet_NaN();
-  const ErrorSummary summary = summarizeErrors(image, noiseOf(image));
-  ASSERT_EQ(summary.tiles.size(), 4u);
-  EXPECT_EQ(summary.tiles[3].window.x0, 74);
-  EXPECT_EQ(summary.tiles[3].window.y1, 90);
-  EXPECT_NEAR(summary.tiles[0].relMse, 0.01, 1e-7);
-  EXPECT_NEAR(summary.tiles[3].relMse, 1, 1e-6);
-  const double share = 36.0 * 6 / 7000;
-  EXPECT_NEAR(summary.relMse, (1 - share) * 0.01 + share, 1e-4);
-  EXPECT_NEAR(summary.render, 0.1, 1e-4);
-}
-
-// What is no number is passed over, whole tiles of it too.
-TEST(ErrorSummary, StepsOverWhatIsNotFinite) {
-  Image image{{0, 0, 128, 4}, {0, 0, 128, 4}, {}, {}};
-  for (const char* c : kRgbNames) {
-    image.add(c, 0.3f);
-    image.add(std::string("variance.") + c, 0.01f);
-    Buffer<float>& error = image.add(std::string("error.") + c, 0.001f).values;
-    for (size_t i = 0; i < error.size(); ++i)
-      if (i % 128 >= 64 || i == 5) error[i] = i % 2 ? std::numeric_limits<float>::quiet_NaN() : 1e20f;
-  }
-  const ErrorSummary summary = summarizeErrors(image, noiseOf(image));
-  ASSERT_EQ(summary.tiles.size(), 2u);
-  EXPECT_NEAR(summary.tiles[0].relMse, 0.01, 1e-7);
-  EXPECT_EQ(summary.tiles[1].relMse, 0);
-  EXPECT_NEAR(summary.relMse, 0.01, 1e-7);
-  EXPECT_NEAR(summary.render, 0.1, 1e-6);
 }
 
 }  // namespace
