@@ -79,7 +79,7 @@ void filterBank(const DenoiseData& data, const FeatureInput& features, std::span
     for (size_t i = 0; i < data.components.size(); ++i) {
       if (tile.active >> i & 1)
         addCandidates(data, data.components[i], guides[i].variance, tile, c++, first, activity.still, candidates[i]);
-      else if (tile.active != 0)
+      else if (activeNear(data, activity, tile.box, 0))
         addDarkness(data, tile.box, candidates[i]);
     }
     count.add(tile);

@@ -15,7 +15,7 @@ namespace fathom::deep {
 // What the passes filtered and what they did not; bins count once per component and bank.
 struct FilterCounts {
   uint64_t tiles = 0, tilesStill = 0,
-           tilesDark = 0;  // all; with nothing noisy; where a component has no light in reach
+           tilesDark = 0;  // all; with nothing noisy or no light at all; where one component has none in reach
   uint64_t binsFiltered = 0, binsSkipped = 0;
 };
 

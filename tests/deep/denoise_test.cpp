@@ -549,6 +549,30 @@ TEST(DenoiseSkips, EmptyTiles) {
       }
 }
 
+// Not still, since one camera sample each says nothing of its noise, and nothing to filter.
+TEST(DenoiseSkips, WhereThereIsNoLightAtAll) {
+  DeepImage image = renderFrame({.width = 100, .height = 60}).noisy;
+  const int lit = 30;
+  for (Channel& channel : image.channels) {
+    const bool isColour = std::ranges::any_of(std::vector<std::string>{"R", "G", "B", "diffuse", "specular", "half"},
+                                              [&](const auto& name) { return channel.name.starts_with(name); });
+    const bool isCount = channel.name.ends_with("samples");
+    for (size_t p = 0; p < image.pixels(); ++p)
+      for (size_t b = image.offsets[p]; b < image.offsets[p + 1] && p % 100 >= lit && (isColour || isCount); ++b)
+        channel.values[b] = isCount && channel.name != "half1.samples" ? 1 : 0;
+  }
+  for (const Quality quality : {Quality::Fast, Quality::Best}) {
+    const DenoisePlan plan = planFor(image, {quality});
+    DenoiseStats stats;
+    const DeepImage out = denoise(image.copy(), plan, {}, &stats);
+    EXPECT_GT(stats.counts["bins skipped"], 1000u);
+    for (const std::string& name : kColours)
+      for (size_t p = 0; p < image.pixels(); ++p)
+        for (size_t b = image.offsets[p]; b < image.offsets[p + 1] && p % 100 >= size_t(lit + denoiseHalo(plan)); ++b)
+          ASSERT_EQ(out.get(name)[b], 0) << name << " at " << p % 100 << ", " << p / 100;
+  }
+}
+
 TEST(DenoiseSkips, AComponentWithoutLight) {
   DeepImage dark = renderFrame().noisy;
   for (Channel& channel : dark.channels)
