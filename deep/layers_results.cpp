@@ -49,7 +49,6 @@ class Pixels {
       for (size_t c = 0; c < 3; ++c) sum[c] += passed * pixel.colour[c];
       passed *= 1 - pixel.alpha;
     }
-    for (size_t c = 0; c < 3; ++c) sum[c] = limited(double(sum[c]));
     sum[3] = 1 - passed;
     return sum;
   }
@@ -146,7 +145,8 @@ DeepImage inLayerColours(DeepImage image, const LayeredRows& rows, const LayerIn
       const std::array<float, 4> all = pixels.composited(y, x);
       const float whole = all[3] > kLeastAlpha ? 1 / all[3] : 0;
       for (uint64_t s = image.offsets[first + size_t(x)]; s < image.offsets[first + size_t(x) + 1]; ++s)
-        for (size_t c = 0; c < 3 && alpha[s] > 0; ++c) rgb[c][s] = std::min(alpha[s], 1.0f) * all[c] * whole;
+        for (size_t c = 0; c < 3 && alpha[s] > 0; ++c)
+          rgb[c][s] = limited(double(std::min(alpha[s], 1.0f)) * double(all[c]) * double(whole));
       for (size_t i = row.samples.first[size_t(x)]; i < row.samples.first[size_t(x) + 1]; ++i) {
         std::array<float, 3> colour{};
         for (int l = 0; l < pixels.layers(); ++l) {

@@ -9,40 +9,19 @@
 
 #include "base/error.h"
 #include "deep/flatten.h"
-#include "deep/layers_results.h"
 #include "flat/finite.h"
 #include "tests/reference/deep_samples.h"
-#include "tests/reference/layered.h"
+#include "tests/reference/layered_results.h"
 #include "tests/reference/noisy_frame.h"
 
 namespace fathom::deep {
 namespace {
 
-nn::LayersNet randomNet() {
-  return nn::LayersNet(nn::readWeights(reference::safetensors(reference::randomLayered(16, 4)), "random"));
-}
+using reference::randomNet;
+using Results = reference::LayeredFrame;
 
-struct Results {
-  flat::Image flat;
-  DeepImage layers, bins;
-  LayersCounts counts;
-};
-
-// A frame in one band.
 Results run(const DeepImage& image, LayersParams params = {}) {
-  static const nn::LayersNet net = randomNet();
-  Results results;
-  const LayerSource source = layerSource(image);
-  const LayerScale scale = measureLayers(source, params);
-  denoiseLayers(
-      net, params, source, scale, image.dataWindow.y0, image.dataWindow.y1,
-      [&](const LayeredRows& rows) {
-        results.flat = flattenedLayers(rows);
-        results.layers = layersImage(rows, image.attributes);
-        results.bins = inLayerColours(image.copy(), rows, source.inputs);
-      },
-      {}, &results.counts);
-  return results;
+  return reference::denoiseLayered(image, params);
 }
 
 // A frame in the bands that a memory limit asks for.
