@@ -45,8 +45,9 @@ std::vector<Triple> triplesOf(DeepImage& image, const std::vector<std::string>& 
   return triples;
 }
 
+// Of t up to 1; what is below 0, or no number, is 0.
 float smooth(float t) {
-  t = std::clamp(t, 0.0f, 1.0f);
+  t = std::max(0.0f, t);
   return t * t * (3 - 2 * t);
 }
 

@@ -142,6 +142,42 @@ TEST(Grade, EmissionHasNoOffsetAndNoGamma) {
   EXPECT_EQ(graded.get("R")[2], kLargest) << "and it makes nothing infinite";
 }
 
+// With one channel too large, be it by gain, in floats or beyond them, the others are still what saturation makes of it.
+TEST(Grade, ResultsEndBeforeTheyAreMixed) {
+  const double most = double(kLargest), grey = 0.2126 * most;
+  struct Case {
+    float red;
+    GradeParams params;
+  };
+  for (auto& [red, params] : {Case{1e10f, {.gain = {1e30f, 1, 1}}}, Case{1e3f, {.gamma = {0.1f, 1, 1}}},
+                              Case{1e10f, {.gamma = {0.1f, 1, 1}}}}) {
+    DeepImage image = reference::makeDeep({{{.z = 1, .alpha = 1, .colour = red}}}, 1);
+    image.get("B")[0] = 0;
+    image.add("G", PixelType::Float).values.fill(0);
+    GradeParams half = params, thousands = params;
+    half.saturation = 0.5f;
+    thousands.saturation = 1e4f;
+    const DeepImage graded = grade(image.copy(), half), limited = grade(image.copy(), thousands);
+    EXPECT_NEAR(graded.get("R")[0] / most, (most + grey) / 2 / most, 1e-6);
+    EXPECT_NEAR(graded.get("G")[0] / most, grey / 2 / most, 1e-6);
+    EXPECT_NEAR(graded.get("B")[0] / most, grey / 2 / most, 1e-6);
+    EXPECT_EQ(limited.get("R")[0], kLargest);
+    EXPECT_EQ(limited.get("G")[0], -kLargest);
+  }
+}
+
+TEST(Grade, WhatIsNoNumberIsNothingWhereItFadesToo) {
+  const GradeParams params{.channels = {"R"}, .offset = {1, 1, 1}, .near = 10, .nearWidth = 2};
+  for (const float odd : {kInf, std::numeric_limits<float>::quiet_NaN(), 1e20f}) {
+    const DeepImage image = reference::makeDeep({{{.z = 9, .alpha = 0.5f, .colour = odd}}}, 1);
+    EXPECT_EQ(grade(image.copy(), params).get("R")[0], 0.25f) << odd;
+  }
+  // No depth is so far away that its weight is none.
+  const DeepImage nearest = reference::makeDeep({{{.z = -kInf, .zBack = -kInf, .alpha = 0.5f, .colour = 0.25f}}}, 1);
+  EXPECT_EQ(grade(nearest.copy(), {.channels = {"R"}, .gain = {3, 3, 3}, .far = -kInf, .farWidth = 1}).get("R")[0],
+            0.25f);
+}
+
 TEST(Grade, WorksOnLayersAndDropsWhatDescribedThem) {
   DeepImage image = randomSamples({.seed = 5});
   for (const char* name :
