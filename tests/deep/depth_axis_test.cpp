@@ -38,6 +38,16 @@ TEST(DepthAxis, HasRoomAround) {
   EXPECT_EQ(axisAround(1, -1, true), DepthAxis{});
 }
 
+// A twenty-fifth on both sides, of the axis or of its powers; next to nothing around a single depth.
+TEST(DepthAxis, RoomIsInProportion) {
+  const DepthAxis even = axisAround(2, 9, false), powers = axisAround(1, 1e4, true), one = axisAround(-5, -5, false);
+  EXPECT_NEAR(even.near, 2 - 0.28, 1e-12);
+  EXPECT_NEAR(even.far, 9 + 0.28, 1e-12);
+  EXPECT_NEAR(std::log10(powers.near), -0.16, 1e-12);
+  EXPECT_NEAR(std::log10(powers.far), 4.16, 1e-12);
+  EXPECT_NEAR(one.far - one.near, 2 * 0.0005 * 5, 1e-12);
+}
+
 TEST(DepthAxis, ZoomsAroundAPlace) {
   for (const DepthAxis& whole : {DepthAxis{-3, 5}, DepthAxis{0.1, 1000, true}}) {
     const DepthAxis closer = zoomed(whole, whole, 0.25, 0.5);
@@ -63,6 +73,18 @@ TEST(DepthAxis, TicksAreRoundAndFew) {
         EXPECT_GE(int(found.size()), 1) << far << " " << most;
         for (const double depth : found) EXPECT_TRUE(depth >= axis.near && depth <= axis.far) << depth;
       }
+}
+
+// 1.1 - 0.5 is a little more than 0.6, and 0.8 - 0.2 too.
+TEST(DepthAxis, RoundingTakesNoTicksAway) {
+  EXPECT_THAT(ticks({0.5, 1.1}, 3), Pointwise(DoubleEq(), {0.6, 0.8, 1.0}));
+  EXPECT_THAT(ticks({0.2, 0.8}, 3), Pointwise(DoubleEq(), {0.5}));
+}
+
+TEST(DepthAxis, PowersBeginAndEndWithTheAxis) {
+  EXPECT_THAT(ticks({1, 100, true}, 9), Pointwise(DoubleEq(), {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0}));
+  EXPECT_THAT(ticks({1.5, 60, true}, 9), Pointwise(DoubleEq(), {2.0, 5.0, 10.0, 20.0, 50.0}));
+  EXPECT_THAT(ticks({0.02, 4000, true}, 3), Pointwise(DoubleEq(), {1.0, 100.0}));
 }
 
 }  // namespace

@@ -74,6 +74,29 @@ TEST(DepthHistogram, IsWhatASlowOneSays) {
   }
 }
 
+// Whichever way their places are rounded: in 25 bins up to 25, that of 7 is rounded up, in 22 that of 15 down.
+TEST(DepthHistogram, PointsOnBordersAreWhereASlowOneHasThem) {
+  for (int bins = 1; bins <= 60; ++bins)
+    for (const DepthAxis& axis : {DepthAxis{0, double(bins)}, DepthAxis{-1, 2.5}, DepthAxis{0.01, 100, true}}) {
+      reference::Pixels pixels(1);
+      for (int i = 0; i < bins; ++i) {
+        const auto z = float(axis.depth(double(i) / bins));
+        for (const float at : {std::nextafter(z, -kInfinity), z, std::nextafter(z, kInfinity)})
+          pixels[0].push_back({at, at, 0.5f});
+      }
+      EXPECT_EQ(depthHistogram(makeDeep(pixels, 1), axis, bins, DepthWeight::Samples),
+                slowHistogram(pixels, axis, bins, DepthWeight::Samples))
+          << bins << " bins from " << axis.near;
+    }
+}
+
+// Nine decades, and a twenty-fifth of that on both sides.
+TEST(DepthHistogram, ALogarithmicAxisEndsNineDecadesBeforeTheLastDepth) {
+  const DepthAxis axis = axisOf(makeDeep({{{1e-12f, 1e-12f, 0.5f}, {0, 0, 0.5f}, {100, 100, 1}}}, 1), true);
+  EXPECT_NEAR(std::log10(axis.near), -7 - 0.36, 1e-6);
+  EXPECT_NEAR(std::log10(axis.far), 2 + 0.36, 1e-6);
+}
+
 TEST(DepthHistogram, OfAllDepthsSumsUpToAlphaAndSamples) {
   const DeepImage image = makeDeep(stacks(9), 3);
   double alpha = 0;
