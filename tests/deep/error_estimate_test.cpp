@@ -94,6 +94,54 @@ TEST_F(ErrorEstimateOfDeep, WhoKnowsTheBinsErrsByTheAlphas) {
   EXPECT_LT(estimate(knows), 0.4 * noise());
 }
 
+// Whoever takes the light from the albedo, noise and all.
+TEST_F(ErrorEstimateOfDeep, WhatTheAlbedoHandsOnIsNoiseAsWell) {
+  DeepImage noisy = frame.noisy.copy();
+  for (const std::string half : {"", "half0.", "half1."})
+    for (const std::string c : {"R", "G", "B"})
+      std::ranges::copy(std::as_const(noisy).get(half + c), noisy.get(half + "albedo." + c).begin());
+  for (const std::string c : {"R", "G", "B"})
+    std::ranges::copy(std::as_const(noisy).get("variance." + c), noisy.get("variance.albedo." + c).begin());
+  const auto albedo = [](DeepImage image, const Progress&) {
+    for (const std::string c : {"R", "G", "B"})
+      std::ranges::copy(std::as_const(image).get("albedo." + c), image.get(c).begin());
+    return image;
+  };
+  EXPECT_NEAR(estimate(noisy, albedo) / noise(noisy), 1, 0.1);
+}
+
+// Two bins of half a pixel each, by 16 camera samples, without noise of their own. Which is seen how often is noise, of the
+// result as of the render: where that is all, an estimate is at least half of it. The denoiser exchanges the bins' colours,
+// and the rest of the estimate is below 0.
+TEST(ErrorEstimateOfAlphas, IsAtLeastHalfOfTheirSpreadInTheResult) {
+  DeepImage noisy{{0, 0, 20, 12}, {0, 0, 20, 12}, Buffer<uint64_t>(241), {}, {}};
+  for (size_t i = 0; i <= 240; ++i) noisy.offsets[i] = 2 * i;
+  const auto fill = [&](const std::string& name, float front, float back) {
+    Buffer<float>& values = noisy.add(name, PixelType::Float).values;
+    for (size_t i = 0; i < values.size(); ++i) values[i] = i % 2 ? back : front;
+  };
+  for (const std::string c : {"R", "G", "B"}) fill(c, 0.5f, 0), fill("variance." + c, 0, 0);
+  fill("A", 0.5f, 1);
+  fill("Z", 1, 2);
+  fill("samples", 8, 8);
+  std::vector<std::string> names;
+  for (const Channel& channel : noisy.channels) names.push_back(channel.name);
+  const auto exchange = [](DeepImage image, const Progress&) {
+    for (const char* c : {"R", "G", "B"})
+      for (size_t b = 0; b < image.samples(); ++b) image.get(c)[b] = b % 2 ? 1.0f : 0.0f;
+    return image;
+  };
+  DeepImage denoised = exchange(noisy.copy(), {});
+  addFlattenedErrors(noisy, findDenoiseInputs(names, {}), exchange, {.probes = 2}, {}, denoised);
+  const double spread = (0.5 * 1 * 1 - 0.5 * 0.5) / 16;
+  const flat::Image flat = flatten(denoised);
+  for (const char* name : {"error.R", "error.G", "error.B"})
+    for (const float v : flat.get(name).values) {
+      EXPECT_GE(v, spread / 2 * (1 - 1e-5));
+      EXPECT_LE(v, spread * (1 + 1e-5));
+    }
+}
+
 TEST_F(ErrorEstimateOfDeep, CanBeStopped) {
   std::stop_source source;
   source.request_stop();
