@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -108,6 +109,114 @@ TEST(LayerSamples, OddValues) {
   image.get("R")[3] = 1e12f;  // exposed beyond all light
   row = layerRow(image, source.inputs, {1e25f, 2}, image.dataWindow.y0);
   EXPECT_TRUE(std::isfinite(at(3, 1)));
+}
+
+using Light = std::array<float, 3>;
+
+void setLight(DeepImage& image, const std::string& prefix, const std::vector<Light>& light) {
+  const std::span<const float> alpha = std::as_const(image).get("A");
+  for (size_t c = 0; c < 3; ++c) {
+    const std::string name = prefix + "RGB"[c];
+    Buffer<float>& values = image.find(name) ? image.find(name)->values : image.add(name, PixelType::Float).values;
+    for (size_t s = 0; s < light.size(); ++s) values[s] = std::min(alpha[s], 1.0f) * light[s][c];
+  }
+}
+
+double meanOf(const Light& light) {
+  return (double(light[0]) + double(light[1]) + double(light[2])) / 3;
+}
+
+TEST(LayerSamples, CameraSamplesDeviateAsTheirPixelDoes) {
+  DeepImage image = reference::makeDeep({{{2, 2, 0.25f}, {6, 6, 1}}, {{3, 3, 0.5f}, {5, 5, 1}}, {{4, 4, 1}}}, 3);
+  const std::vector<Light> light = {{3, 1, 2}, {0.5f, 0.25f, 0.1f}, {3, 1, 2}, {0, 0, 0}, {1, 2, 3}};
+  setLight(image, "", light);
+  image.attributes.set("fathom:spp", 4);
+  const LayerSource source = layerSource(image);
+  ASSERT_TRUE(source.inputs.cameraSamples());
+  const double exposure = 0.5;
+  const LayerRow row = layerRow(image, source.inputs, {float(exposure), 4}, image.dataWindow.y0);
+  const auto expect = [&](size_t sample, size_t first, double share) {
+    double squares = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      const double a = double(light[first][c]), b = double(light[first + 1][c]), mean = share * a + (1 - share) * b;
+      squares += (std::pow(share * (a - mean), 2) + std::pow((1 - share) * (b - mean), 2)) / 3;
+    }
+    const double deviation = std::sqrt(squares / (1 - share * share - (1 - share) * (1 - share)));
+    const double relative = exposure * deviation / (exposure * meanOf(light[sample]) + 0.01);
+    EXPECT_NEAR(row.samples.plane(18)[sample], std::log1p(std::min(8.0, relative)), 1e-5) << sample;
+  };
+  expect(0, 0, 0.25);
+  expect(1, 0, 0.25);
+  expect(2, 2, 0.5);
+  expect(3, 2, 0.5);  // black: 8
+  EXPECT_EQ(row.samples.plane(18)[4], 0) << "one alone tells nothing";
+  EXPECT_NEAR(row.samples.plane(19)[0], std::log2(1 + 0.25 * 4) / 8, 1e-6);
+}
+
+TEST(LayerSamples, BinsDeviateByTheirVariances) {
+  DeepImage image = reference::makeDeep({{{2, 2, 0.5f}, {6, 6, 1}}}, 1);
+  const std::vector<Light> diffuse = {{0.3f, 0.6f, 0.9f}, {1, 1, 1}}, specular = {{1, 2, 3}, {0.1f, 0.1f, 0.1f}},
+                           albedo = {{0.2f, 0.4f, 0.6f}, {4, 0.5f, 0.5f}};
+  setLight(image, "diffuse.", diffuse);
+  setLight(image, "specular.", specular);
+  setLight(image, "albedo.", albedo);
+  const auto fill = [&](const std::string& name, float first, float second) {
+    Buffer<float>& values = image.add(name, PixelType::Float).values;
+    values[0] = first, values[1] = second;
+  };
+  fill("variance.diffuse.R", -1, 0.04f), fill("variance.diffuse.G", 0.5f, 0.04f), fill("variance.diffuse.B", 1, 0.04f);
+  for (const char* c : {"R", "G", "B"}) fill(std::string("variance.specular.") + c, 0.25f, 100);
+  fill("samples", -3, 7);
+  for (const char* c : {"X", "Y", "Z"}) fill(std::string("N.") + c, -0.75f, 3);
+  const LayerSource source = layerSource(image);
+  const double exposure = 2;
+  const LayerRow row =
+      layerRow(image, source.inputs, {float(exposure), 4, {}, {nn::SampleLight::Diffuse, nn::SampleLight::Specular}},
+               image.dataWindow.y0);
+  const auto at = [&](size_t plane, size_t sample) { return row.samples.plane(plane)[sample]; };
+  const Light divisors[] = {{0.3f, 0.5f, 0.7f}, {1.1f, 0.6f, 0.6f}};  // an albedo is at most 1
+  for (size_t s = 0; s < 2; ++s) {
+    Light divided;
+    for (size_t c = 0; c < 3; ++c) {
+      divided[c] = diffuse[s][c] / divisors[s][c];
+      EXPECT_NEAR(at(c, s), std::log1p(exposure * double(divided[c])), 1e-5);
+      EXPECT_NEAR(at(6 + c, s), std::min(albedo[s][c], 1.0f), 1e-6);
+    }
+    const double ofDiffuse = s == 0 ? std::sqrt((0 + 0.5 + 1) / 3) : 0.2, ofSpecular = s == 0 ? 0.5 : 10;
+    EXPECT_NEAR(at(17, s),
+                std::log1p(exposure * ofDiffuse / (meanOf(divisors[s]) * (exposure * meanOf(divided) + 0.01))), 1e-5);
+    EXPECT_NEAR(at(18, s), std::log1p(std::min(8.0, exposure * ofSpecular / (exposure * meanOf(specular[s]) + 0.01))),
+                1e-5);
+  }
+  EXPECT_EQ(at(9, 0), -1) << "a normal is at least -1";
+  EXPECT_EQ(at(9, 1), 1) << "and at most 1";
+  EXPECT_EQ(at(19, 0), 0) << "less than none";
+  EXPECT_NEAR(at(19, 1), 3 / 8.0, 1e-6);
+}
+
+TEST(LayerSamples, LightEndsBeforeItsSumsDo) {
+  DeepImage image = reference::makeDeep({{{2, 2, 0.5f}, {6, 6, 1}}}, 1);
+  setLight(image, "", {{1e12f, -1e12f, 1}, {1, 1, 1}});
+  const LayerRow row = layerRow(image, layerSource(image).inputs, {1e25f, 4}, image.dataWindow.y0);
+  EXPECT_EQ(row.samples.plane(nn::kExposedAt + 3)[0], 1e30f);
+  EXPECT_EQ(row.samples.plane(nn::kExposedAt + 4)[0], -1e30f);
+  EXPECT_EQ(row.samples.plane(nn::kExposedAt + 5)[0], 1e25f);
+}
+
+TEST(LayerSamples, AnAlphaBeyondOneIsOne) {
+  DeepImage image = reference::makeDeep({{{2, 2, 0.5f}, {4, 4, 1.5f}, {6, 6, 1}}}, 1);
+  setLight(image, "", {{1, 1, 1}, {3, 3, 3}, {9, 9, 9}});
+  const LayerRow row = layerRow(image, layerSource(image).inputs, {2, 4}, image.dataWindow.y0);
+  ASSERT_EQ(row.samples.count(), 2u) << "nothing is seen behind it";
+  EXPECT_EQ(row.samples.plane(nn::kExposedAt + 3)[1], 6);
+  EXPECT_EQ(row.samples.plane(16)[1], 0.5f);
+  EXPECT_EQ(row.render[0], 0.5f * 1 + 0.5f * 3);
+}
+
+TEST(LayerSamples, DepthsBehindTheCameraHaveAUnitAllTheSame) {
+  DeepImage image = reference::makeDeep({{{-3, -3, 0.5f}, {-2, -2, 1}}}, 1);
+  setLight(image, "", {{1, 1, 1}, {3, 3, 3}});
+  EXPECT_EQ(measureLayers(layerSource(image), {}).depth, 1);
 }
 
 // FATHOM_LAYERS_GOLDEN: see tests/nn/layers_golden_test.cpp.
