@@ -172,6 +172,32 @@ TEST(Compress, ThickVolumesStayApart) {
   EXPECT_LE(distanceOf(image, compress(image.copy(), {.error = 1e-3}), 0).transmittance, 1.001e-3);
 }
 
+// Two volumes, each of 9 optical depths, whose alpha together is 1 as FLOAT.
+TEST(Compress, BehindWhatIsOpaqueTogetherNothingIsLeft) {
+  const float alpha = 1 - 0x1p-13f;
+  const DeepImage image = reference::makeDeep({{{.z = 1, .zBack = 2, .alpha = alpha, .colour = 0.5f, .id = 1},
+                                                {.z = 1, .zBack = 2, .alpha = alpha, .colour = 0.25f, .id = 2},
+                                                {.z = 3, .zBack = 3, .alpha = 1, .colour = 9, .id = 3}}},
+                                              1);
+  const std::vector<reference::Sample> samples = reference::samplesOf(compress(image.copy(), {}), 0);
+  ASSERT_EQ(samples.size(), 1u);
+  EXPECT_EQ(samples[0].z, 1);
+  EXPECT_EQ(samples[0].zBack, 2);
+  EXPECT_EQ(samples[0].alpha, 1);
+  EXPECT_NEAR(samples[0].colour, (0.5 + 0.25) / 2 / double(alpha), 1e-6);
+}
+
+TEST(Compress, OfEmissionPlainChannelsAreMeans) {
+  DeepImage image = reference::makeDeep(
+      {{{.z = 1, .zBack = 1, .colour = 0.5f, .id = 5}, {.z = 2, .zBack = 2, .colour = 1e-5f, .id = 6}}}, 1);
+  Buffer<float>& coc = image.add("coc", PixelType::Float).values;
+  coc[0] = 1;
+  coc[1] = 4;
+  const DeepImage small = compress(std::move(image), {});
+  ASSERT_EQ(small.samples(), 1u);
+  EXPECT_FLOAT_EQ(small.get("coc")[0], 2.5f);
+}
+
 TEST(Compress, WhatIsHiddenGoesAndEmissionStays) {
   const DeepImage image = reference::makeDeep(
       {{{.z = 1, .zBack = 1, .alpha = 1, .colour = 0.5f, .id = 5}, {.z = 2, .zBack = 2, .alpha = 0.5f, .colour = 9}},

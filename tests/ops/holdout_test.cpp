@@ -218,6 +218,15 @@ TEST(HardHoldout, ThickVolumesTogetherHideFromTheDepthWhereTheyAreOpaqueEnough) 
   }
 }
 
+TEST(HardHoldout, WhatIsOpaqueByRoundingHidesFromItsBack) {
+  const float thick = 1 - 0x1p-24f;
+  const DeepImage other = makeDeep({{{1, 37, thick, 0, 1}, {1, 37, thick, 0, 1}, {1, 37, thick, 0, 1}}}, 1);
+  for (const auto& [z, stays] : {std::pair{30.0f, true}, {37.0f, false}, {38.0f, false}}) {
+    const DeepImage image = makeDeep({{{z, z, 1, 0.5f, 1}}}, 1);
+    EXPECT_EQ(hardHoldout(image, other, 1).samples() == 1, stays) << z;
+  }
+}
+
 TEST(HardHoldout, AnOpaqueVolumeHidesFromItsFront) {
   const DeepImage other = makeDeep({{{2, 6, 1, 0, 1}}}, 1);
   for (const double opaque : {0.5, 1.0})
@@ -264,6 +273,14 @@ TEST(Holdout, PlainChannelsAreThoseOfTheImage) {
   for (const float coc : held.get("coc")) EXPECT_FLOAT_EQ(coc, 5);
 }
 
+TEST(Holdout, PlainChannelsOfEmissionStay) {
+  DeepImage fire = makeDeep({{{3, 5, 0, 0.8f, 7}}}, 1);
+  fire.add("coc", PixelType::Float).values.fill(5);
+  const DeepImage held = holdout(std::move(fire), makeDeep({{{1, 4, 0.75f, 0, 1}}}, 1));
+  ASSERT_EQ(held.samples(), 2u);
+  for (const float coc : held.get("coc")) EXPECT_EQ(coc, 5);
+}
+
 TEST(HoldoutMatte, IsThePartOfAlphaThatIsSeen) {
   const DeepImage image = randomImage(2), other = randomImage(4);
   const flat::Image matte = holdoutMatte(image, other), held = flatten(holdout(image.copy(), other));
@@ -274,6 +291,17 @@ TEST(HoldoutMatte, IsThePartOfAlphaThatIsSeen) {
     EXPECT_NEAR(part * flat.get("A").values[p], held.get("A").values[p], 1e-6);
     EXPECT_TRUE(image.count(p) > 0 || part == 1);
     EXPECT_LE(part, 1);
+  }
+}
+
+// Also where what is seen is rounded up and the whole down.
+TEST(HoldoutMatte, IsNeverMoreThanOne) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    const DeepImage image = randomSamples({.seed = seed, .volumes = true, .most = 8});
+    DeepImage other = randomSamples({.seed = seed + 1000, .volumes = true});
+    for (float& alpha : other.get("A")) alpha = 1e-9f;
+    const flat::Image matte = holdoutMatte(image, other);
+    for (const float part : matte.get("A").values) ASSERT_LE(part, 1) << "seed " << seed;
   }
 }
 
