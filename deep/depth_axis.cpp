@@ -45,7 +45,6 @@ std::vector<double> powerTicks(const DepthAxis& axis, std::initializer_list<doub
 std::vector<float> cellPlanes(const DepthAxis& axis, int cells) {
   std::vector<float> planes(size_t(cells) + 1);
   for (size_t i = 0; i < planes.size(); ++i) planes[i] = float(axis.depth(double(i) / cells));
-  planes.front() = float(axis.near);
   planes.back() = std::nextafter(float(axis.far), std::numeric_limits<float>::infinity());
   return planes;
 }

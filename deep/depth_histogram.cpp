@@ -37,7 +37,6 @@ class Spreader {
  public:
   Spreader(const DepthAxis& axis, int bins) : axis_(axis), edges_(size_t(bins) + 1), bins_(size_t(bins), 0.0) {
     for (int i = 0; i <= bins; ++i) edges_[size_t(i)] = axis.depth(double(i) / bins);
-    edges_.front() = axis.near;
     edges_.back() = axis.far;
   }
 
@@ -51,7 +50,7 @@ class Spreader {
     const double density = weight / (double(range.zBack) - double(range.z));
     const size_t first = binOf(begin), last = binOf(end);
     for (size_t i = first; i <= last; ++i)
-      bins_[i] += density * std::max(0.0, std::min(end, edges_[i + 1]) - std::max(begin, edges_[i]));
+      bins_[i] += density * (std::min(end, edges_[i + 1]) - std::max(begin, edges_[i]));
   }
 
   std::vector<double> take() { return std::move(bins_); }
@@ -60,7 +59,7 @@ class Spreader {
   // Of a depth on the axis, whichever way its place was rounded.
   size_t binOf(double depth) const {
     const size_t last = bins_.size() - 1;
-    size_t bin = std::min(size_t(std::max(0.0, axis_.place(depth) * double(bins_.size()))), last);
+    size_t bin = std::min(size_t(axis_.place(depth) * double(bins_.size())), last);
     while (bin > 0 && depth < edges_[bin]) --bin;
     while (bin < last && depth >= edges_[bin + 1]) ++bin;
     return bin;

@@ -138,7 +138,7 @@ flat::Image finish(const DeepImage& noisy, const DeepImage& denoised, const Buff
     const Buffer<float> both = alphaCovariance(noisy, denoised, weight, name),
                         ofResult = alphaCovariance(denoised, denoised, weight, name);
     for (size_t i = 0; i < y.size(); ++i) {
-      const float n = std::max(noise.samples[i], 1.0f), e = f[i] - y[i];
+      const float n = noise.samples[i], e = f[i] - y[i];
       estimate.covariance[c][i] += both[i] / n;
       estimate.spread[c][i] += std::max(ofResult[i], 0.0f) / n;
       estimate.error[c][i] = e * e - noise.variance[c][i] + 2 * estimate.covariance[c][i];
@@ -157,7 +157,7 @@ void shareOut(const Buffer<float>& ofPixels, const Buffer<float>& weight, const 
     float covered = 0;
     for (size_t b = begin; b < end; ++b) covered += weight[b];
     for (size_t b = begin; b < end; ++b)
-      values[b] = covered > 0 && alpha[b] > 0 ? std::min(alpha[b], 1.0f) * ofPixels[pixel] / covered : 0;
+      values[b] = alpha[b] > 0 ? std::min(alpha[b], 1.0f) * ofPixels[pixel] / covered : 0;
   });
 }
 

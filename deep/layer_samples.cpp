@@ -81,7 +81,7 @@ float deviationAt(const Triple& variance, uint64_t s) {
   float sum = 0;
   for (const std::span<const float>& v : variance) {
     if (!std::isfinite(v[s])) return 0;
-    sum += std::clamp(v[s], 0.0f, kMostExposed) / 3;
+    sum += std::max(v[s], 0.0f) / 3;
   }
   return std::sqrt(sum);
 }
@@ -212,7 +212,7 @@ class RowMaker {
       for (size_t i = from; i < to; ++i) mean += share(i) * at(c, i);
       for (size_t i = from; i < to; ++i) squares += std::pow(share(i) * (at(c, i) - mean), 2) / 3;
     }
-    return float(std::min(std::sqrt(squares / independent), double(kMostExposed)));
+    return float(std::sqrt(squares / independent));
   }
 
   void addCounts(const std::vector<float>& weights) {
