@@ -49,9 +49,7 @@ double FogSlabs::Stretch::depthWithin(double length) const {
 }
 
 double FogSlabs::Stretch::lengthWithin(double depth) const {
-  const double fall = std::abs(rate) * depth / densest;
-  const double length = rate == 0 ? depth / densest : (fall < 1 ? -std::log1p(-fall) / std::abs(rate) : to - from);
-  return std::min(length, to - from);
+  return rate == 0 ? depth / densest : -std::log1p(-std::abs(rate) * depth / densest) / std::abs(rate);
 }
 
 double FogSlabs::Stretch::depthBefore(double z) const {
@@ -59,7 +57,7 @@ double FogSlabs::Stretch::depthBefore(double z) const {
 }
 
 double FogSlabs::Stretch::where(double depth) const {
-  return rate >= 0 ? from + lengthWithin(depth) : to - lengthWithin(std::max(0.0, this->depth() - depth));
+  return rate >= 0 ? from + lengthWithin(depth) : to - lengthWithin(this->depth() - depth);
 }
 
 void FogSlabs::findStretches(const ViewRay& ray) {
@@ -91,7 +89,7 @@ void FogSlabs::set(int x, int y) {
   bool even = true;
   for (const Stretch& stretch : stretches_) {
     all += stretch.depth();
-    even &= stretch.rate == 0 && stretch.densest == stretches_[0].densest;
+    even &= stretch.rate == 0;
   }
   if (!(all > 0)) return;
   wanted_.clear();
@@ -106,6 +104,7 @@ void FogSlabs::set(int x, int y) {
   for (const double depth : wanted_) {
     while (k + 1 < stretches_.size() && depth > before + stretches_[k].depth()) before += stretches_[k++].depth();
     const float z = float(stretches_[k].where(depth - before));
+    // Rounding may bring it to an end of the fog or, where that is thick beyond all measure, make it no number.
     if (!(z > borders_.back() && z < float(params_.far))) continue;
     borders_.push_back(z);
     depths_.push_back(std::clamp(before + stretches_[k].depthBefore(double(z)), depths_.back(), all));
