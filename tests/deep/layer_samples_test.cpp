@@ -211,6 +211,13 @@ TEST(LayerSamples, AnAlphaBeyondOneIsOne) {
   EXPECT_EQ(row.samples.plane(nn::kExposedAt + 3)[1], 6);
   EXPECT_EQ(row.samples.plane(16)[1], 0.5f);
   EXPECT_EQ(row.render[0], 0.5f * 1 + 0.5f * 3);
+  for (const char* c : {"R", "G", "B"}) {
+    DeepImage bright = image.copy();
+    bright.get(c)[1] = 1.2e15f;  // as of alpha 1 no number
+    const LayerRow lost = layerRow(bright, layerSource(bright).inputs, {2, 4}, bright.dataWindow.y0);
+    EXPECT_EQ(lost.samples.count(), 1u) << c;
+    EXPECT_EQ(lost.nonFinite[0], 1u) << c;
+  }
 }
 
 TEST(LayerSamples, DepthsBehindTheCameraHaveAUnitAllTheSame) {

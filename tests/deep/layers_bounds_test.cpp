@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "flat/finite.h"
+#include "tests/reference/deep_samples.h"
 #include "tests/reference/layered_results.h"
 #include "tests/reference/noisy_frame.h"
 
@@ -28,7 +29,7 @@ bool isPremultiplied(const std::string& name) {
 TEST(LayersBounds, TheLeastMemoryHoldsABandATileAndWhatIsReadAtOnce) {
   const nn::LayersNet net = reference::randomNet();
   constexpr double kMb = 1 << 20;
-  for (const auto& [width, height] : {std::pair{4000, 2000}, {2002, 17}, {40, 30}})
+  for (const auto& [width, height] : {std::pair{20000, 2000}, {2002, 17}, {40, 30}})
     for (const int lights : {1, 2}) {
       const double side = 64 + 2 * std::max(net.contextHalo(), net.filterHalo()), across = (width + 3) / 4 * 4,
                    down = (height + 3) / 4 * 4;
@@ -123,6 +124,24 @@ TEST(LayersBounds, SamplesWithoutASayGetTheColourOfTheirPixel) {
       }
     }
   EXPECT_GT(lit, 50u);
+}
+
+TEST(LayersBounds, AFrameWithoutASayIsBlack) {
+  DeepImage image = makeNoisyFrame(12, 8, 1);
+  for (float& z : image.get("Z")) z = kNan;
+  const LayeredFrame found = denoiseLayered(image);
+  for (const char* name : {"R", "G", "B"})
+    for (const float v : found.bins.get(name)) ASSERT_EQ(v, 0);
+}
+
+TEST(LayersBounds, LightAloneIsWhereItWas) {
+  DeepImage image = reference::makeDeep({{{7, 7, 0, 8}, {9, 9, 0, 2}}}, 1);
+  image.add("G", PixelType::Float).values.fill(1);
+  const LayeredFrame found = denoiseLayered(image);
+  ASSERT_EQ(found.layers.samples(), 1u);
+  EXPECT_EQ(found.layers.get("A")[0], 0);
+  EXPECT_EQ(found.layers.get("Z")[0], 7);
+  EXPECT_EQ(found.layers.get("R")[0], 10);
 }
 
 // Of a pixel as bright as can be and half transparent, all the light is twice as much.

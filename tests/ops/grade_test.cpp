@@ -166,6 +166,14 @@ TEST(Grade, ResultsEndBeforeTheyAreMixed) {
   }
 }
 
+// A step of the quotient is a fifth of it; raised to a tenth, that would be a fiftieth.
+TEST(Grade, HardlyAnyLightIsRaisedInDouble) {
+  const float red = 4 * std::numeric_limits<float>::denorm_min(), alpha = 0.9f;
+  const DeepImage image = reference::makeDeep({{{.z = 1, .alpha = alpha, .colour = red}}}, 1);
+  const double expected = std::pow(double(red) / double(alpha), 0.1) * double(alpha);
+  EXPECT_NEAR(grade(image.copy(), {.channels = {"R"}, .gamma = {10, 1, 1}}).get("R")[0] / expected, 1, 1e-5);
+}
+
 TEST(Grade, WhatIsNoNumberIsNothingWhereItFadesToo) {
   const GradeParams params{.channels = {"R"}, .offset = {1, 1, 1}, .near = 10, .nearWidth = 2};
   for (const float odd : {kInf, std::numeric_limits<float>::quiet_NaN(), 1e20f}) {
