@@ -142,6 +142,28 @@ TEST(ErrorEstimateOfAlphas, IsAtLeastHalfOfTheirSpreadInTheResult) {
     }
 }
 
+TEST_F(ErrorEstimateOfDeep, WhatHidesNothingHasNoError) {
+  DeepImage noisy = frame.noisy.copy();
+  for (size_t b = 0; b < noisy.samples(); b += b < 100 ? 1 : 7) noisy.get("A")[b] = b % 2 ? 0 : std::nanf("");
+  DeepImage denoised = noisy.copy();
+  const auto same = [&](DeepImage image, const Progress&) {
+    for (size_t b = 0; b < noisy.samples(); ++b)
+      if (!(noisy.get("A")[b] > 0)) {
+        EXPECT_EQ(image.get("diffuse.R")[b], noisy.get("diffuse.R")[b]) << "probes leave it as it is";
+      }
+    return image;
+  };
+  addFlattenedErrors(noisy, inputs, same, {.probes = 1}, {}, denoised);
+  for (const char* name : {"error.R", "error.G", "error.B"})
+    for (size_t b = 0; b < noisy.samples(); ++b) {
+      const float error = denoised.get(name)[b];
+      ASSERT_TRUE(error >= 0) << error;
+      if (!(noisy.get("A")[b] > 0)) {
+        ASSERT_EQ(error, 0);
+      }
+    }
+}
+
 TEST_F(ErrorEstimateOfDeep, CanBeStopped) {
   std::stop_source source;
   source.request_stop();
