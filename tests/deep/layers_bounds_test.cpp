@@ -31,10 +31,10 @@ TEST(LayersBounds, TheLeastMemoryHoldsABandATileAndWhatIsReadAtOnce) {
   constexpr double kMb = 1 << 20;
   for (const auto& [width, height] : {std::pair{20000, 2000}, {2002, 17}, {40, 30}})
     for (const int lights : {1, 2}) {
-      const double side = 64 + 2 * std::max(net.contextHalo(), net.filterHalo()), across = (width + 3) / 4 * 4,
-                   down = (height + 3) / 4 * 4;
-      const double held = std::min(4.0 + 2 * net.halo(), down) * net.bandBytes(2, lights);
-      const double needed = across * (held + 4 * 6 * sizeof(float)) + net.tileBytes() * side * side;
+      const int across = (width + 3) / 4 * 4, down = (height + 3) / 4 * 4,
+                side = 64 + 2 * std::max(net.contextHalo(), net.filterHalo());
+      const double held = std::min(4 + 2 * net.halo(), down) * net.bandBytes(2, lights);
+      const double needed = across * (held + 4 * 6 * sizeof(float)) + net.tileBytes() * double(side) * side;
       const auto least = double(leastLayersBytes(net, 2, lights, {0, 0, width, height}));
       const double left = least - std::max(kMb, std::floor(least / 8));
       EXPECT_GE(left, needed - 1) << width << "x" << height;
