@@ -146,6 +146,85 @@ TEST(ReplaceAlpha, ABinThatNothingComesToIsEmpty) {
   EXPECT_THAT(valuesOf(image, "R"), ElementsAre(0.5f, 0.0f));
 }
 
+TEST(Features, AreThoseOfTheSurfaceAndTheirNoise) {
+  for (const char* name :
+       {"albedo.R", "N.X", "variance.albedo.G", "variance.N.Z", "variance.Z", "half0.albedo.B", "half1.albedo.B"})
+    EXPECT_TRUE(isFeature(name)) << name;
+  for (const char* name : {"R", "Z", "variance.R", "half0.R", "half1.N.X", "diffuse.R", "albedo", "variance.ZBack"})
+    EXPECT_FALSE(isFeature(name)) << name;
+}
+
+TEST(AddFeatures, TheMiddleOfAVolumeStandsForIt) {
+  const auto withBacks = [](DeepImage image, const std::vector<float>& backs) {
+    std::ranges::copy(backs, image.add("ZBack", PixelType::Float).values.begin());
+    return image;
+  };
+  // The first sample begins nearer to the first bin, and its middle, 3.5, is nearer to the second's, 4.
+  DeepImage image = withBacks(makeRow({{{1, 1, 0}, {2, 1, 0}}}, {}), {1, 6});
+  const DeepImage features = withBacks(makeRow({{{0.5f, 0.5f, 0.25f}, {6, 0.5f, 0.5f}}}, {"albedo.R"}), {6.5f, 6});
+  addFeatures(image, features);
+  // The second bin takes both, with effective alphas of 0.5 and 0.25; the first has the nearest one.
+  EXPECT_THAT(valuesOf(image, "albedo.R"),
+              Pointwise(FloatNear(1e-6f), std::vector<float>{0.5f, (0.5f * 0.5f + 0.25f * 1) / 0.75f}));
+}
+
+TEST(AddFeatures, TheNearestTakesTheAlphaOfTheBin) {
+  DeepImage image = makeRow({{{1, 0.5f, 0}, {5, 0.25f, 0}}}, {});
+  addFeatures(image, makeRow({{{1, 0.5f, 0.3f}}}, {"albedo.R"}));
+  EXPECT_THAT(valuesOf(image, "albedo.R"), Pointwise(FloatNear(1e-6f), std::vector<float>{0.3f, 0.15f}));
+}
+
+TEST(AddFeatures, VariancesAreThoseOfTheMean) {
+  DeepImage image = makeRow({{{1, 0.5f, 0}, {5, 1, 0}}}, {});
+  const DeepImage features = makeRow({{{0.9f, 0.2f, 0.1f}, {1.2f, 0.5f, 0.5f}}}, {"variance.Z"});
+  addFeatures(image, features);
+  const float mean = (0.2f * 0.2f * 0.1f + 0.4f * 0.4f * 0.5f) / (0.6f * 0.6f);
+  EXPECT_THAT(valuesOf(image, "variance.Z"), Pointwise(FloatNear(1e-6f), std::vector<float>{mean, 0.5f}));
+}
+
+TEST(AddFeatures, FlatOnesAreFoundByTheirPlace) {
+  DeepImage image = makeRow({{{1, 1, 0}}, {{1, 0.5f, 0}}, {{1, 1, 0}}}, {});
+  flat::Image features{{-1, -3, 2, 2}, {0, 0, 8, 8}, {}, {}};
+  Buffer<float>& values = features.add("N.X").values;
+  for (size_t i = 0; i < values.size(); ++i) values[i] = float(i);
+  addFeatures(image, features);
+  // Row 0 is the fourth of three columns; the third pixel is outside.
+  EXPECT_THAT(valuesOf(image, "N.X"), ElementsAre(10.0f, 11.0f, 0.0f));
+}
+
+TEST(AddFeatures, FlatOnesAreNothingWhereNothingIsSeen) {
+  DeepImage image = makeRow({{{1, 1, 0}, {2, 0.5f, 0}}, {{1, 0, 0}}}, {});
+  flat::Image features{{0, 0, 2, 1}, {0, 0, 2, 1}, {}, {}};
+  features.add("albedo.R", 0.5f);
+  features.add("variance.albedo.R", 0.25f);
+  addFeatures(image, features);
+  EXPECT_THAT(valuesOf(image, "albedo.R"), ElementsAre(0.5f, 0.25f, 0.0f));
+  EXPECT_THAT(valuesOf(image, "variance.albedo.R"), ElementsAre(0.25f, 0.0f, 0.0f));
+}
+
+TEST(AddHalf, AllColoursComeAndNothingElse) {
+  DeepImage image = makeRow({{{1, 1, 1}}}, {});
+  const std::vector<std::string> colours = {"R", "G", "B", "diffuse.G", "specular.B", "albedo.R"};
+  std::vector<std::string> all = colours;
+  all.insert(all.end(), {"N.X", "variance.R", "Rest"});
+  addHalf(image, makeRow({{{1, 1, 0.5f}}}, all), 0, 4);
+  EXPECT_EQ(image.channels.size(), 2 + colours.size() + 1);  // with Z, A and the samples
+  for (const std::string& name : colours) EXPECT_THAT(valuesOf(image, "half0." + name), ElementsAre(0.5f)) << name;
+}
+
+TEST(AddHalf, SamplesThatNobodySeesAreNotCounted) {
+  DeepImage image = makeRow({{{1, 0.5f, 1}}}, {});
+  addHalf(image, makeRow({{{1, 0, 5}, {2, 0.5f, 3}}}, {"samples"}), 0, 4);
+  EXPECT_THAT(valuesOf(image, "half0.samples"), ElementsAre(3.0f));
+}
+
+TEST(ReplaceAlpha, ABinWithoutAlphaHasNoColour) {
+  DeepImage image = makeRow({{{1, 0, 0.5f}, {5, 1, 0.25f}}}, {"R"});
+  replaceAlpha(image, makeRow({{{1, 0.5f, 0}, {5, 1, 0}}}, {}));
+  EXPECT_THAT(valuesOf(image, "A"), ElementsAre(0.5f, 1.0f));
+  EXPECT_THAT(valuesOf(image, "R"), ElementsAre(0.0f, 0.25f));
+}
+
 TEST(Pairing, WindowsNeedNotAgree) {
   DeepImage image = makeRow({{{1, 1, 0}}, {{1, 1, 0}}}, {"R"});
   addFeatures(image, makeRow({{{1, 1, 0.5f}}, {{1, 1, 0.25f}}}, {"albedo.R"}, 1));

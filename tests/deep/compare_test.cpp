@@ -180,5 +180,81 @@ TEST(DeepCompare, TheMedianDepthHalvesTheAlpha) {
   EXPECT_THROW(medianDepth(makeGrey({{{1, 1, 0, 0, 0}}}, 1)), Error);
 }
 
+TEST(DeepCompare, VariancesThatAreNoneCountAsNone) {
+  DeepImage reference = makeGrey({{{1, 1, 0.5f, 0.4f, 0}, {3, 3, 1, 0.2f, 0}}}, 1);
+  for (const float odd : {-0.5f, kNan, 1e20f, kInfinity}) {
+    for (const char* name : {"variance.R", "variance.G", "variance.B"}) fill(reference, name, {odd, 0.02f});
+    const DeepMetrics m = compare(reference, reference);
+    EXPECT_NEAR(*m.bins.ownRelMse, 0.5 * 0.02 / 0.05, 1e-6) << odd;
+    EXPECT_NEAR(*m.flattened.ownRelMse, 0.25 * 0.02 / 0.26, 1e-6) << odd;
+  }
+}
+
+TEST(DeepCompare, VariancesOfOneColourAloneSayNothing) {
+  DeepImage reference = makeGrey({{{1, 1, 0.5f, 0.4f, 0}, {3, 3, 1, 0.2f, 0}}}, 1);
+  fill(reference, "variance.R", {0.01f, 0.02f});
+  fill(reference, "variance.G", {0.01f, 0.02f});
+  EXPECT_FALSE(compare(reference, reference).bins.ownRelMse);
+  EXPECT_FALSE(compare(reference, reference).flattened.ownRelMse);
+  EXPECT_EQ(visiblePart(reference).planes.size(), 4u);
+  EXPECT_THAT(errorOf(reference, reference, {.correct = true}), HasSubstr("channel variance.R: expected"));
+}
+
+TEST(DeepCompare, PartsAreOfThePixelsThatHaveThem) {
+  const DeepImage reference = makeGrey({{{1, 1, 0.5f, 0.4f, 0}, {3, 3, 1, 0.2f, 0}}, {{3, 3, 1, 0.2f, 0}}}, 2);
+  const DeepImage image = makeGrey({{{1, 1, 0.5f, 0.5f, 0}, {3, 3, 1, 0.2f, 0}}, {{3, 3, 1, 0.2f, 0}}}, 2);
+  const DeepMetrics m = compare(image, reference, {.clips = {2}});
+  EXPECT_EQ(m.clips[0].front->pixels, 1u);
+  EXPECT_NEAR(m.clips[0].front->relMse, relative(0.5, 0.4), 1e-6);
+  EXPECT_EQ(m.clips[0].behind->pixels, 2u);
+  EXPECT_NEAR(m.flattened.relMse, relative(0.6, 0.5) / 2, 1e-6);
+}
+
+TEST(DeepCompare, TheReferencesOwnErrorIsTakenOffPartsToo) {
+  DeepImage reference = makeGrey({{{1, 1, 0.5f, 0.4f, 0}, {3, 3, 1, 0.2f, 0}}}, 1);
+  const DeepImage image = makeGrey({{{1, 1, 0.5f, 0.5f, 0}, {3, 3, 1, 0.6f, 0}}}, 1);
+  for (const char* name : {"variance.R", "variance.G", "variance.B"}) fill(reference, name, {0.01f, 0.02f});
+  const DeepMetrics m = compare(image, reference, {.correct = true, .clips = {2}});
+  EXPECT_NEAR(m.clips[0].front->relMse, relative(0.5, 0.4) - 0.25 * 0.01 / 0.17, 1e-6);
+  EXPECT_NEAR(m.clips[0].behind->relMse, relative(0.3, 0.1) - 0.25 * 0.02 / 0.02, 1e-6);
+  EXPECT_NEAR(m.flattened.relMse, relative(0.8, 0.5) - (0.25 * 0.01 + 0.25 * 0.02) / 0.26, 1e-6);
+}
+
+TEST(DeepCompare, WhatIsAtInfinityIsBehindEveryPlane) {
+  for (const float far : {kInfinity, kNan}) {
+    const DeepImage image = makeGrey({{{1, 1, 0.5f, 0.4f, 0}, {far, far, 1, 0.2f, 0}}}, 1);
+    EXPECT_NEAR(visiblePart(image).get("R").values[0], 0.5f, 1e-6f);
+    EXPECT_NEAR(visiblePart(image).get("A").values[0], 1, 1e-6f);
+    EXPECT_NEAR(visiblePart(image, 1e30f).get("R").values[0], 0.1f, 1e-6f);
+    EXPECT_NEAR(visiblePart(image, -kInfinity, 1e30f).get("R").values[0], 0.4f, 1e-6f);
+  }
+}
+
+TEST(DeepCompare, AReferencesVariancesFollowFromThoseOfFewerSamples) {
+  DeepImage reference = makeGrey({{{1, 1, 0.5f, 0.4f, 0}, {3, 3, 1, 0.2f, 0}}, {{2, 2, 1, 1, 0}}}, 2);
+  DeepImage noisy = reference.copy();
+  fill(noisy, "samples", {8, 16, 4});
+  EXPECT_THROW(addOwnVariance(noisy, reference), Error);
+  fill(reference, "samples", {32, 0, 64});
+  EXPECT_THROW(addOwnVariance(noisy, reference), Error);
+  for (const char* name : {"variance.R", "variance.G", "variance.B"}) fill(noisy, name, {0.04f, 0.02f, -1});
+  fill(noisy, "variance.G", {kNan, 0.02f, 0.5f});
+  addOwnVariance(noisy, reference);
+  const auto variances = [&](const char* name) {
+    const auto values = std::as_const(reference).get(name);
+    return std::vector<float>(values.begin(), values.end());
+  };
+  // Of a fourth of the noise; of none where nothing tells; of none.
+  EXPECT_EQ(variances("variance.R"), (std::vector<float>{0.01f, 0, 0}));
+  EXPECT_EQ(variances("variance.G"), (std::vector<float>{0, 0, 0.03125f}));
+  EXPECT_EQ(variances("variance.B"), (std::vector<float>{0.01f, 0, 0}));
+  EXPECT_THROW(addOwnVariance(makeGrey({{{1, 1, 0.5f, 0.4f, 0}}, {}}, 2), reference), Error);
+}
+
+TEST(DeepCompare, TheMedianIsOfFiniteDepths) {
+  for (const float far : {kInfinity, kNan})
+    EXPECT_EQ(medianDepth(makeGrey({{{1, 1, 0.1f, 0, 0}, {2, 2, 0.2f, 0, 0}, {far, far, 1, 0, 0}}}, 1)), 2);
+}
+
 }  // namespace
 }  // namespace fathom::deep
