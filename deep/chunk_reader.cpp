@@ -1,8 +1,5 @@
 #include "deep/chunk_reader.h"
 
-#include <OpenEXR/ImfChannelList.h>
-#include <OpenEXR/ImfHeader.h>
-
 #include <algorithm>
 #include <array>
 
@@ -18,21 +15,16 @@ std::span<T> sized(Buffer<T>& buffer, size_t size) {
   return {buffer.data(), size};
 }
 
-void checkLayout(const std::string& where, const PartInfo& part) {
+void checkCompression(const std::string& where, const PartInfo& part) {
   if (part.compression == Compression::Other || part.compression == Compression::Zip)
     fail("{}: expected compression none, rle or zips, found {}", where, part.compressionName);
-  const Imf::ChannelList& channels = part.attributes.header().channels();
-  for (auto c = channels.begin(); c != channels.end(); ++c)
-    if (c.channel().xSampling != 1 || c.channel().ySampling != 1)
-      fail("{}, channel {}: expected sampling 1 1, found {} {}", where, printable(c.name()), c.channel().xSampling,
-           c.channel().ySampling);
 }
 
 }  // namespace
 
 ChunkReader::ChunkReader(const ExrFile& file, const PartInfo& part)
     : file_(file), part_(part), where_(file.where(part)), grid_(gridOf(part)) {
-  checkLayout(where_, part);
+  checkCompression(where_, part);
   table_ = file.chunkTable(part);
   for (const ChannelInfo& c : part.channels) sampleBytes_ += valueBytes(c.type);
 }

@@ -162,8 +162,7 @@ void settleType(Imf::Header& header, int version, bool multiPart) {
 
 // Standard attributes of another type than theirs say nothing, and could not be set where the header is written again.
 void dropMistyped(Imf::Header& header) {
-  for (const char* name : {"name", "view"})
-    if (!header.findTypedAttribute<Imf::StringAttribute>(name)) eraseAttribute(header, name);
+  if (!header.findTypedAttribute<Imf::StringAttribute>("name")) eraseAttribute(header, "name");
   for (const char* name : {"version", "chunkCount", "maxSamplesPerPixel"})
     if (!header.findTypedAttribute<Imf::IntAttribute>(name)) eraseAttribute(header, name);
 }
@@ -212,9 +211,12 @@ std::string ExrFile::where(const PartInfo& part) const {
 
 uint64_t ExrFile::chunkCount(const PartInfo& part) const {
   const Imf::Header& header = part.attributes.header();
+  const bool known = Imf::isSupportedType(header.type());
+  if (!known && !header.hasChunkCount())
+    fail("{}: attribute chunkCount: expected in a part of type {}, found none", where(part), printable(header.type()));
   double count = 0;
-  if (!Imf::isSupportedType(header.type()))
-    count = header.hasChunkCount() ? header.chunkCount() : -1;
+  if (!known)
+    count = header.chunkCount();
   else if (part.tiled)
     count = countTiles(part);
   else

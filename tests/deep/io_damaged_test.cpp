@@ -1,4 +1,6 @@
 // Damaged deep files: cut, flipped and crafted. Each gives an image or one line, before memory is spent on a promise.
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfStringVectorAttribute.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -155,12 +157,52 @@ TEST_F(Damaged, AttributesWhoseSizeIsNotThatOfWhatIsInThem) {
               HasSubstr("attribute screenWindowCenter: expected 8 bytes for its type v2f, found 4"));
 }
 
+TEST_F(Damaged, StringsThatAreLongerThanTheirAttribute) {
+  DeepImage image = randomDeep({0, 0, 6, 5}, {0, 0, 6, 5}, {{"A", PixelType::Half}});
+  Imf::Header header;
+  header.insert("views", Imf::StringVectorAttribute({"left", "right"}));
+  image.attributes = Attributes(header);
+  write(path_, image);
+  bytes_ = bytesOf(path_);
+  ASSERT_EQ(errorOf(bytes_), "");
+  const size_t first = bytes_.find("stringvector") + 13 + 4;
+  const std::string expected = "a.exr: attribute views: expected strings within 17 bytes, found one of ";
+  EXPECT_THAT(errorOf(with(first, int32_t(14))), HasSubstr(expected + "14"));
+  EXPECT_THAT(errorOf(with(first, int32_t(-1))), HasSubstr(expected + "4294967295"));
+  EXPECT_THAT(errorOf(with(first + 8, int32_t(6))), HasSubstr(expected + "6"));
+}
+
+TEST_F(Damaged, NamesMayHave255Letters) {
+  make(Compression::Zips);
+  DeepImage image = read(path_);
+  EXPECT_THAT(errorOf(std::string(bytes_).insert(bytes_.find("channels"), 300, 'n')),
+              HasSubstr("a.exr: header: expected a name of at most 255 letters, found a longer one"));
+  image.attributes.set(std::string(255, 'n'), 7);
+  write(path_, image);
+  EXPECT_EQ(read(path_).attributes.getInt(std::string(255, 'n')), 7);
+}
+
 TEST_F(Damaged, StandardAttributesOfAnotherTypeAreNoHindranceToWriting) {
   make(Compression::Zips);
   for (const std::string name : {"chunkCount", "maxSamplesPerPixel", "version"}) {
     ASSERT_EQ(errorOf(with(bytes_.find(name) + name.size() + 1, 'j')), "") << name;
     EXPECT_NO_THROW(write(folder_ / "b.exr", read(path_))) << name;
   }
+}
+
+TEST_F(Damaged, TilesAreNamedByTheirPlace) {
+  make(Compression::Zips, 4, {10, 20, 16, 25});
+  const size_t table = size_t(chunk(0)) - 4 * 8;
+  EXPECT_THAT(errorOf(with(table + 8, uint64_t(0))), HasSubstr("a.exr, tile at 14 20: missing"));
+  EXPECT_THAT(errorOf(with(table + 16, uint64_t(0))), HasSubstr("a.exr, tile at 10 24: missing"));
+}
+
+TEST_F(Damaged, ChannelsOfAnotherSamplingAreRefused) {
+  make(Compression::Zips);
+  // Behind the name: the type, a flag with three empty bytes, and the two samplings.
+  const size_t sampling = bytes_.find("Z", bytes_.find("chlist") + 11) + 2 + 8;
+  EXPECT_THAT(errorOf(with(sampling, int32_t(2))), AllOf(HasSubstr("a.exr: header: "), HasSubstr("\"Z\"")));
+  EXPECT_THAT(errorOf(with(sampling + 4, int32_t(5))), AllOf(HasSubstr("a.exr: header: "), HasSubstr("\"Z\"")));
 }
 
 TEST_F(Damaged, CompressionsThatAreNotForDeepParts) {
