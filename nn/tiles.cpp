@@ -53,7 +53,6 @@ void denoiseTiles(const CompositionalNet& net, const CompositionalInput& frame, 
   arena.execute([&] {
     parallelFor(0, int(tiles.size()), [&](int i) {
       const Tile& tile = tiles[size_t(i)];
-      if (progress.stop.stop_requested()) throw Cancelled();
       auto workspace = workspaces.take();
       net.denoise(frame, tile.window, tile.components, out, *workspace, progress.stop);
       workspaces.giveBack(std::move(workspace));

@@ -170,8 +170,8 @@ void readMetadata(const json& value, WeightFile& file) {
 }
 
 std::vector<Entry> readEntries(const json& header, WeightFile& file) {
-  if (header.size() > kMostTensors + 1)
-    fail("{}: expected at most {} tensors, found {}", file.name, kMostTensors, header.size());
+  const size_t tensors = header.size() - header.count("__metadata__");
+  if (tensors > kMostTensors) fail("{}: expected at most {} tensors, found {}", file.name, kMostTensors, tensors);
   std::vector<Entry> entries;
   for (const auto& item : header.items()) {
     if (item.key() == "__metadata__") {

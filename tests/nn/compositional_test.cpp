@@ -137,6 +137,10 @@ TEST(Tiles, ReportAndStop) {
   };
   tiled(net, frame, small(1), {}, progress);
   EXPECT_DOUBLE_EQ(last, 1);
+  last = 0;
+  tiled(
+      net, frame, small(1), [](const Window&) { return BlockWorth{.work = false}; }, progress);
+  EXPECT_EQ(last, 1);
 
   std::stop_source source;
   int after = 0;
@@ -166,7 +170,7 @@ TEST(CompositionalNet, RefusesOtherFiles) {
             "random, metadata version: expected 2, found 1");
   EXPECT_EQ(message([](PlainWeights& w) { w.metadata["inputs"] = "23"; }),
             "random, metadata inputs: expected 24, found 23");
-  for (const char* width : {"", "0", "8", "-16", "999", "16x", "100000000000000000000"})
+  for (const char* width : {"", "0", "8", "-16", "264", "272", "999", "0016", "16x", "100000000000000000000"})
     EXPECT_EQ(message([&](PlainWeights& w) { w.metadata["width"] = width; }),
               std::string("random, metadata width: expected a multiple of 16 up to 256, found ") + width);
   EXPECT_EQ(message([](PlainWeights& w) { w.metadata["width"] = "32"; }),

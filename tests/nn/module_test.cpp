@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <cmath>
 #include <thread>
@@ -13,15 +14,10 @@
 namespace fathom::nn {
 namespace {
 
+using reference::addConv;
 using reference::PlainWeights;
 using reference::randomVolume;
 using reference::Volume;
-
-void addConv(PlainWeights& weights, const std::string& name, int from, int to, int kernel, uint32_t seed) {
-  const Volume values = randomVolume(to * from, kernel, kernel, seed, -0.3, 0.3);
-  weights.tensors[name + ".weight"] = {{to, from, kernel, kernel}, floatsOf(values)};
-  weights.tensors[name + ".bias"] = {{to}, floatsOf(randomVolume(1, 1, to, seed + 1, -0.5, 0.5))};
-}
 
 std::vector<float> packed(const Volume& volume, Layout layout) {
   std::vector<float> values = floatsOf(volume);
@@ -136,6 +132,25 @@ TEST(Module, SumsConcatenationsAndEnlargementsEqualTheirTwins) {
   }
 }
 
+// A value that is added twice stays until the second time.
+TEST(Module, WhatIsAddedTwiceStaysAsItIs) {
+  PlainWeights weights;
+  for (const char* name : {"a", "b", "c", "d"}) addConv(weights, name, 16, 16, 3, uint32_t(*name));
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  const Value in = graph.input(16), a = graph.conv(source, "a", in, {.channels = 16});
+  const Value b = graph.conv(source, "b", a, {.channels = 16});
+  const Value once = graph.conv(source, "c", b, {.channels = 16, .add = a});
+  const Value twice = graph.conv(source, "d", once, {.channels = 16, .add = a});
+  graph.output(twice);
+  const Module module(std::move(graph));
+  const Volume x = randomVolume(16, 6, 10, 9, -1, 1);
+  const Volume va = relu(convolve(weights, "a", x)), vb = relu(convolve(weights, "b", va));
+  const Volume vc = relu(plus(convolve(weights, "c", vb), va));
+  expectNear(run(module, {x}, twice), relu(plus(convolve(weights, "d", vc), va)));
+}
+
 TEST(Module, PlansAreSharedAndRunAtOnce) {
   PlainWeights weights;
   addConv(weights, "c", 16, 16, 3, 1);
@@ -175,49 +190,7 @@ TEST(Module, KeepsSixtyFourPlans) {
   EXPECT_EQ(module.plan(65, 2), last);
 }
 
-TEST(Graph, ReachesAsFarAsItsLayers) {
-  PlainWeights weights;
-  addConv(weights, "a", 16, 16, 3, 1);
-  addConv(weights, "down", 16, 16, 2, 1);
-  addConv(weights, "b", 16, 16, 3, 1);
-  const WeightFile file = readWeights(reference::safetensors(weights), "x");
-  WeightSource source(file);
-  Graph graph;
-  const Value in = graph.input(16), unused = graph.input(16);
-  const Value a = graph.conv(source, "a", in, {.channels = 16});
-  const Value down = graph.conv(source, "down", a, {.channels = 16, .kernel = 2, .stride = 2});
-  const Value up = graph.upsample(graph.conv(source, "b", down, {.channels = 16}));
-  EXPECT_EQ(graph.alignment(), 2);
-  EXPECT_EQ(graph.reach({{a.index, {0, 4}}})[0], (Interval{-1, 5}));
-  EXPECT_EQ(graph.reach({{down.index, {0, 2}}})[0], (Interval{-1, 5}));
-  EXPECT_EQ(graph.reach({{up.index, {0, 4}}})[0], (Interval{-3, 7}));
-  EXPECT_EQ(graph.reach({{up.index, {-1, 3}}})[0], (Interval{-5, 7}));
-  EXPECT_EQ(graph.reach({{up.index, {0, 4}}})[size_t(unused.index)], (Interval{0, 0}));
-  EXPECT_DOUBLE_EQ(graph.flopPerPixel(), 2.0 * 16 * 16 * (9 + 4 / 4.0 + 9 / 4.0));
-}
-
-TEST(Graph, RefusesWhatItCannotRun) {
-  PlainWeights weights;
-  addConv(weights, "c", 16, 16, 3, 1);
-  const WeightFile file = readWeights(reference::safetensors(weights), "x");
-  WeightSource source(file);
-  Graph graph;
-  const Value in = graph.input(16), other = graph.input(8);
-  EXPECT_THROW(graph.conv(source, "c", in, {.channels = 16, .kernel = 4}), std::logic_error);
-  EXPECT_THROW(graph.conv(source, "c", in, {.channels = 16, .kernel = 3, .stride = 2}), std::logic_error);
-  EXPECT_THROW(graph.conv(source, "c", in, {.channels = 16, .add = other}), std::logic_error);
-  EXPECT_THROW(graph.upsample(in), std::logic_error);
-  EXPECT_THROW(graph.concat({in, other}), std::logic_error);
-  EXPECT_THROW(graph.output(in), std::logic_error);
-  const Value c = graph.conv(source, "c", in, {.channels = 16});
-  graph.concat({c});
-  EXPECT_THROW(graph.concat({c}), std::logic_error);
-  const Module module(std::move(graph));
-  EXPECT_THROW(module.plan(0, 4), std::logic_error);
-  EXPECT_THROW(module.plan(4, -4), std::logic_error);
-}
-
-TEST(Module, PlansAreOfAlignedSizes) {
+TEST(Module, PlansAreForWholeMultiplesOfTheAlignment) {
   PlainWeights weights;
   addConv(weights, "down", 16, 16, 2, 1);
   const WeightFile file = readWeights(reference::safetensors(weights), "x");
@@ -225,9 +198,32 @@ TEST(Module, PlansAreOfAlignedSizes) {
   Graph graph;
   graph.output(graph.conv(source, "down", graph.input(16), {.channels = 16, .kernel = 2, .stride = 2}));
   const Module module(std::move(graph));
+  for (const auto& [height, width] :
+       {std::pair(3, 4), std::pair(4, 3), std::pair(0, 4), std::pair(4, 0), std::pair(-2, 4), std::pair(4, -2)})
+    EXPECT_THROW(module.plan(height, width), std::logic_error) << height << " x " << width;
   EXPECT_EQ(module.plan(4, 6)->width(), 6);
-  EXPECT_THROW(module.plan(4, 5), std::logic_error);
-  EXPECT_THROW(module.plan(5, 4), std::logic_error);
+}
+
+TEST(Module, LeavesTheThreadsOfItsCallerAsTheyWere) {
+  PlainWeights weights;
+  addConv(weights, "c", 16, 16, 3, 1);
+  const WeightFile file = readWeights(reference::safetensors(weights), "x");
+  WeightSource source(file);
+  Graph graph;
+  const Value in = graph.input(16), out = graph.conv(source, "c", in, {.channels = 16});
+  graph.output(out);
+  const Module module(std::move(graph));
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(3);
+  run(module, {randomVolume(16, 4, 4, 1, -1, 1)}, out);
+  EXPECT_EQ(omp_get_max_threads(), 3);
+  omp_set_num_threads(before);
+}
+
+TEST(Module, BfloatIsForThoseWhoAskForItOrMachinesThatMultiplyIt) {
+  EXPECT_EQ(elementFor(Precision::float32), Element::float32);
+  EXPECT_EQ(elementFor(Precision::bfloat16), Element::bfloat16);
+  EXPECT_EQ(elementFor(Precision::automatic), machineHasBfloat16() ? Element::bfloat16 : Element::float32);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 
@@ -189,6 +190,57 @@ TEST(Weights, RangesAreRefused) {
   EXPECT_EQ(two("[0,8]", "[8,12]", 11),
             "x.safetensors, tensor b: expected data within 11 bytes, found it to end at 12");
   EXPECT_EQ(two("[0,8]", "[8,12]", 16), "x.safetensors: expected 12 bytes of tensors, found 16");
+}
+
+TEST(Weights, MayHaveSoManyTensorsAndNamesSoLong) {
+  const auto tensors = [](size_t count) {
+    PlainWeights weights;
+    for (size_t i = 0; i < count; ++i) weights.tensors[std::to_string(i)] = {{1}, {1}};
+    return weights;
+  };
+  PlainWeights most = tensors(4096);
+  EXPECT_EQ(refusal(safetensors(most)), "accepted");
+  most.metadata = {{"format", "test"}};
+  EXPECT_EQ(refusal(safetensors(most)), "accepted");
+  EXPECT_EQ(refusal(safetensors(tensors(4097))), "x.safetensors: expected at most 4096 tensors, found 4097");
+
+  PlainWeights named;
+  named.tensors[std::string(256, 'n')] = {{1}, {1}};
+  EXPECT_EQ(refusal(safetensors(named)), "accepted");
+  named.tensors[std::string(257, 'n')] = {{1}, {1}};
+  EXPECT_EQ(refusal(safetensors(named)), "x.safetensors: expected tensor names of 1 to 256 bytes, found one of 257");
+}
+
+TEST(Weights, HalvesThatAreNotFiniteAreNamed) {
+  const auto of = [](int high) {
+    return refusal(
+        withHeader(header("\"F16\"", "[2]", "[0,4]"), {std::byte(0), std::byte(0), std::byte(0), std::byte(high)}));
+  };
+  const std::string expected = "x.safetensors, tensor t: expected finite numbers, found ";
+  EXPECT_EQ(of(0x7c), expected + "inf at index 1");
+  EXPECT_EQ(of(0xfc), expected + "-inf at index 1");
+  EXPECT_EQ(of(0x7e), expected + "nan at index 1");
+}
+
+TEST(Weights, FilesOfAnyLengthAreNotRead) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "w.safetensors";
+  std::ofstream(path, std::ios::binary) << "x";
+  std::filesystem::resize_file(path, (uint64_t(1) << 30) + (1 << 20) + 9);  // nothing of it is on the disk
+  try {
+    readWeights(path);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(std::string(e.what()), path + ": expected a weight file of at most 1074790408 bytes, found 1074790409");
+  }
+}
+
+TEST(Weights, LongTextsAreCutInErrors) {
+  const std::string where = "x.safetensors, tensor t: ", digits(100, '7');
+  EXPECT_EQ(refusalOfHeader(header("\"" + digits + "\"", "[1]", "[0,4]"), 4),
+            where + "expected dtype F32, F16 or BF16, found " + digits.substr(0, 60));
+  EXPECT_EQ(refusalOfHeader(header("\"F32\"", "\"" + digits + "\"", "[0,4]"), 4),
+            where + "expected a shape of at most 8 numbers, found \"" + digits.substr(0, 56) + "...");
 }
 
 TEST(Weights, MustBeFinite) {

@@ -194,4 +194,11 @@ inline Volume splatted(const Volume& logits, const Volume& values) {
   return out;
 }
 
+// The tensors NAME.weight and NAME.bias of a convolution.
+inline void addConv(PlainWeights& weights, const std::string& name, int from, int to, int kernel, uint32_t seed) {
+  const Volume values = randomVolume(to * from, kernel, kernel, seed, -0.3, 0.3);
+  weights.tensors[name + ".weight"] = {{to, from, kernel, kernel}, floatsOf(values)};
+  weights.tensors[name + ".bias"] = {{to}, floatsOf(randomVolume(1, 1, to, seed + 1, -0.5, 0.5))};
+}
+
 }  // namespace fathom::reference
