@@ -20,6 +20,7 @@ TEST(ErrorSummary, IsTheMeanOfRelativeErrorsByFrameAndTile) {
       for (const char* c : kRgbNames)
         image.find(std::string("error.") + c)->values[image.dataWindow.index(x, y)] = 0.1f;
   image.find("R")->values[0] = std::numeric_limits<float>::quiet_NaN();
+  image.find("error.G")->values[1] = std::numeric_limits<float>::quiet_NaN();
   const ErrorSummary summary = summarizeErrors(image, noiseOf(image));
   ASSERT_EQ(summary.tiles.size(), 4u);
   EXPECT_EQ(summary.tiles[3].window.x0, 74);

@@ -111,6 +111,8 @@ TEST(ExrCodec, RefusesDamage) {
 
 TEST(ExrCodec, BoundsWhatPackedBytesCanHold) {
   EXPECT_EQ(mostUnpacked(Compression::None, 10), 10u);
+  // Deflate's densest code: two bits for 258 bytes.
+  EXPECT_EQ(mostUnpacked(Compression::Zips, 10), 10u * 4 * 258);
   const Bytes zeros(size_t(1) << 20);
   for (Compression compression : kAll) {
     const Bytes file = packed(compression, zeros, zeros.size());

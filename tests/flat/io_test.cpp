@@ -70,18 +70,19 @@ TEST(FlatIo, FloatComesBackBitForBit) {
 
 TEST(FlatIo, UintChannelsAreReadByValue) {
   const TemporaryFolder folder;
-  const uint32_t ids[4] = {0, 7, 65537, 4000001};
-  Imf::Header header(4, 1);
+  std::vector<uint32_t> ids(4096);
+  for (size_t i = 0; i < ids.size(); ++i) ids[i] = uint32_t(1021 * i);
+  Imf::Header header(4096, 1);
   header.channels().insert("id", Imf::Channel(Imf::UINT));
   {
     Imf::OutputFile file((folder / "ids.exr").c_str(), header);
     Imf::FrameBuffer frame;
-    frame.insert("id", Imf::Slice(Imf::UINT, const_cast<char*>(reinterpret_cast<const char*>(ids)), sizeof *ids, 0));
+    frame.insert("id", Imf::Slice(Imf::UINT, reinterpret_cast<char*>(ids.data()), sizeof ids[0], 0));
     file.setFrameBuffer(frame);
     file.writePixels(1);
   }
   const Image image = read(folder / "ids.exr");
-  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(image.get("id").values[i], float(ids[i]));
+  for (size_t i = 0; i < ids.size(); ++i) ASSERT_EQ(image.get("id").values[i], float(ids[i]));
 }
 
 TEST(FlatIo, HalfKeepsTheRangeOfDepthsAndVariances) {
@@ -210,6 +211,30 @@ TEST(FlatIo, AHeaderThatPromisesTooMuchIsRefusedBeforeAllocation) {
   writeBytes(folder / "huge.exr", bytes);
   EXPECT_THAT(errorOf(folder / "huge.exr"),
               HasSubstr("huge.exr, part 0: expected at most 8590 MB of pixels, found a header that"));
+}
+
+TEST(FlatIo, PngOfOneChannelIsGrey) {
+  const TemporaryFolder folder;
+  Image image{{5, 5, 8, 6}, {0, 0, 20, 20}, {}, {}};
+  image.add("Y");
+  for (size_t i = 0; i < 3; ++i) image.planes[0].values[i] = float(i) / 5;
+  writePng(folder / "a.png", image);
+  const Image back = read(folder / "a.png");
+  ASSERT_EQ(back.planes.size(), 1u);
+  for (size_t i = 0; i < 3; ++i) EXPECT_FLOAT_EQ(back.planes[0].values[i], float(51 * i) / 255);
+  EXPECT_THAT(errorOf(folder / "a.png", {.memoryLimit = 11}), HasSubstr("a.png, part 0: expected at most"));
+  EXPECT_EQ(errorOf(folder / "a.png", {.memoryLimit = 12}), "");
+  Image empty{{5, 5, 5, 6}, {0, 0, 20, 20}, {}, {}};
+  empty.add("Y");
+  try {
+    writePng(folder / "b.png", empty);
+    ADD_FAILURE();
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("b.png: expected an image to write, found an empty one"));
+  }
+  image.planes[0].name = "Z";
+  EXPECT_THROW(writePng(folder / "b.png", image), Error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "b.png"));
 }
 
 }  // namespace

@@ -105,6 +105,13 @@ TEST(Metrics, SsimOfImagesSmallerThanAWindow) {
   EXPECT_DOUBLE_EQ(compare(image, image).ssim, 1);
   EXPECT_LT(compare(image, makeNoise(4, 3, 5)).ssim, 0.9);
   EXPECT_EQ(compare(makeNoise(1, 1, 4), makeNoise(1, 1, 4)).ssim, 1);
+  EXPECT_LT(compare(makeNoise(10, 10, 4), makeNoise(10, 10, 5)).ssim, 0.9);
+}
+
+TEST(Metrics, SsimIsOneWhereNoWindowIsWhole) {
+  Image reference = makeNoise(20, 20, 4);
+  reference.add("A", 0).values[0] = 1;
+  EXPECT_EQ(compare(makeNoise(20, 20, 5), reference, {.onlyCovered = true}).ssim, 1);
 }
 
 TEST(Metrics, TrimmingTakesTheFireflies) {
@@ -217,6 +224,24 @@ TEST(Metrics, FlickerNeedsBothFramesFiniteAndTakesBothVariancesOff) {
   EXPECT_DOUBLE_EQ(flicker(before, reference, after, reference), 0.25 / 0.26);
   addVariance(reference, 0.03125f);
   EXPECT_NEAR(flicker(before, reference, after, reference, {.correct = true}), 0.1875 / 0.26, 1e-12);
+}
+
+TEST(Metrics, VariancesOfTwoColoursSayNothing) {
+  const Image image = makeImage(20, 20, 0.75f);
+  Image reference = makeImage(20, 20, 0.5f);
+  for (const char* name : {"variance.R", "variance.G"}) reference.add(name, 0.0125f);
+  EXPECT_FALSE(compare(image, reference).ownRelMse);
+  EXPECT_THAT(errorOf(image, reference, {.correct = true}), HasSubstr("channel variance.R: expected"));
+}
+
+TEST(Metrics, FlickerIsOfOneWindow) {
+  const Image before = makeImage(4, 4), after = makeImage(5, 4);
+  try {
+    flicker(before, before, after, after);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_STREQ(e.what(), "expected the data window of the frame before, (0, 0) to (3, 3), found (0, 0) to (4, 3)");
+  }
 }
 
 TEST(Metrics, IndependentErrorsFlickerTwice) {
