@@ -4,7 +4,6 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <new>
 
@@ -65,7 +64,7 @@ void readRows(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec, in
   if (!done) throw Error(input.geterror());
 }
 
-// OpenImageIO maps integers to [0,1]; ids are wanted as they are.
+// OpenImageIO maps integers to [0,1]; ids are wanted as they are. The scale is 2^32 as a float, and the product exact.
 float scaleOf(const OIIO::ImageSpec& spec, int channel) {
   return spec.channelformat(channel) == OIIO::TypeUInt32 ? 4294967295.0f : 1.0f;
 }
@@ -78,7 +77,7 @@ void separate(const std::vector<float>& interleaved, const OIIO::ImageSpec& spec
     const float scale = scaleOf(spec, c);
     for (size_t i = 0; i < pixels; ++i) {
       const float value = interleaved[i * stride + size_t(c)];
-      out[i] = scale == 1 ? value : std::round(value * scale);
+      out[i] = scale == 1 ? value : value * scale;
     }
   }
 }
