@@ -122,7 +122,7 @@ DeepImage denoise(DeepImage image, const DenoisePlan& plan, const Progress& prog
   clock.lap("compose");
   if (guide && !guide->bins.empty()) {
     const Buffer<float> second = fromBinImages(image, guide->bins);
-    mixBins(data, second, activity.still, plan.level, bins);
+    mixBins(data, second, activity.still, plan.level, guide->consistency.binPrior, bins);
   }
   clock.lap("mix");
   const bool gated = plan.params.gate && plan.params.filter == FilterKind::Own;

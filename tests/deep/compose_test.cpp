@@ -135,7 +135,7 @@ struct Mixed {
       for (size_t c = 0; c < 3; ++c)
         gated[b].filtered[c] = first, gated[b].residual[c] = noisy - first, second[3 * b + c] = other;
     }
-    mixBins(bins.data, {second.data(), second.size()}, Buffer<uint8_t>(gated.size(), 0), 0.5f, gated);
+    mixBins(bins.data, {second.data(), second.size()}, Buffer<uint8_t>(gated.size(), 0), 0.5f, 0.5f, gated);
   }
 };
 
