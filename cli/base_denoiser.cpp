@@ -193,8 +193,9 @@ BaseDenoiser makeBase(const BaseOptions& options, const deep::DenoisePlan& plan,
   return base;
 }
 
-double networkWork(const BaseOptions& options) {
+double networkWork(BaseOptions options, bool guide) {
   constexpr double kSmall = 72e3;  // per pixel, K = 1, width 16
+  if (guide && options.model.empty()) options.model = defaultModel(true);
   return modelOf(options, deep::Quality::Balanced).net->flopPerPixel(1) / kSmall;
 }
 

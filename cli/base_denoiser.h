@@ -82,8 +82,9 @@ std::shared_ptr<const flat::OidnLibrary> findOidn(const std::string& path);
 // Whether a model is named or installed. It may still be one that cannot be read.
 bool hasModel(const BaseOptions& options);
 
-// The arithmetic of the network that is meant, over that of a network as wide as `small`. Throws Error where it cannot be had.
-double networkWork(const BaseOptions& options);
+// The arithmetic of the network that is meant, of flat frames or as a guide of deep ones, over that of a network as wide as
+// `small`. Throws Error where it cannot be had.
+double networkWork(BaseOptions options, bool guide);
 
 // All of a plan that decides what our own filter makes, as text to be hashed.
 std::string describeFilter(const deep::DenoisePlan& plan);

@@ -32,14 +32,17 @@ std::vector<std::string> openWays(const DenoiseRequest& request, const SequenceP
   if (isGuideFile(choice)) return {kGuideFile};
   if (choice != "auto") return {choice};
   if (!canBeGuided(plan.denoise.inputs)) return {"none"};
-  if (findOidn(request.base.oidnLibrary)) return {"none", kOwnBase, kOidnBase};
-  return {"none", kOwnBase};
+  std::vector<std::string> ways = {"none", kOwnBase};
+  if (hasModel(request.base)) ways.emplace_back(kNeuralBase);
+  if (findOidn(request.base.oidnLibrary)) ways.emplace_back(kOidnBase);
+  return ways;
 }
 
 // Whether a request lets a setting be; the library is not looked for, so that its absence is an error of its own.
 bool allows(const DenoiseRequest& request, const SequencePlan& plan, const DenoiseSetting& setting) {
   if (setting.deep != plan.deep) return false;
-  if (setting.with == kNeuralBase && request.base.components && request.base.components != setting.components)
+  if (setting.with == kNeuralBase && setting.components && request.base.components &&
+      request.base.components != setting.components)
     return false;
   if (!plan.deep) return request.anyBase || setting.with == request.base.name;
   const std::string choice = guideChoice(request);
@@ -54,27 +57,30 @@ Workload workloadOf(const SequencePlan& plan) {
           plan.denoise.inputs.components, plan.errors ? 1 + flat::SureParams().probes : 1, runsOf(plan)};
 }
 
-// Whether whole frames leave the network's memory; our own filter takes bands.
-bool networkFits(const DenoiseRequest& request, const SequencePlan& plan) {
+// Whether whole frames leave a way its memory; our own filter takes bands.
+bool fits(const std::string& way, const DenoiseRequest& request, const SequencePlan& plan) {
+  if (plan.deep) return guideFits(way, request.base, plan.denoise, plan.pixels, request.memory);
+  if (way != kNeuralBase) return true;
   BaseOptions named = request.base;
   named.name = kNeuralBase;
   const size_t scratch = decodedLimit(request.memory);
   return makeBase(named, plan.denoise, scratch).bytes(plan.pixels, scratch) <= workingBytes(request.memory) / 2;
 }
 
-// What a budget may choose from: without the network where it may be any base, and this one cannot be had or needs too much
-// memory.
+// What a budget may choose from: where that is more than one way, without those that cannot be had or need too much memory.
 std::vector<SettingCost> openCosts(const DenoiseRequest& request, const SequencePlan& plan, Workload& workload) {
   std::vector<std::string> ways = openWays(request, plan);
-  if (const auto network = std::ranges::find(ways, kNeuralBase); network != ways.end()) {
+  if (ways.size() > 1)
+    std::erase_if(ways, [&](const std::string& way) {
+      try {
+        return !fits(way, request, plan);
+      } catch (const Error&) {
+        return true;
+      }
+    });
+  if (std::ranges::find(ways, kNeuralBase) != ways.end()) {
     workload.bfloat16 = nn::machineHasBfloat16();
-    try {
-      workload.networkWork = networkWork(request.base);
-      if (ways.size() > 1 && !networkFits(request, plan)) ways.erase(network);
-    } catch (const Error&) {
-      if (ways.size() == 1) throw;
-      ways.erase(network);
-    }
+    workload.networkWork = networkWork(request.base, plan.deep);
   }
   std::vector<SettingCost> costs = costsOf(plan.deep, ways);
   std::erase_if(costs, [&](const SettingCost& cost) { return !allows(request, plan, cost.setting); });

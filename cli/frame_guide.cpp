@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "cli/memory_limit.h"
 #include "cli/method_choice.h"
+#include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
 #include "flat/io.h"
 #include "flat/noise.h"
@@ -76,8 +77,9 @@ GuidePlan oidnGuide(const std::shared_ptr<const flat::OidnLibrary>& library, boo
 GuidePlan neuralGuide(const BaseOptions& options, const deep::DenoisePlan& plan, size_t scratch) {
   BaseOptions named = options;
   named.name = kNeuralBase;
+  if (named.model.empty()) named.model = defaultModel(true);
   const BaseDenoiser base = makeBase(named, plan, scratch);
-  return {{base.denoise, base.denoise, {}}, true, base.settings, base.bytes};
+  return {{base.denoise, base.denoise, deep::kNetworkGuide}, true, base.settings, base.bytes};
 }
 
 flat::Image sampleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
@@ -104,9 +106,7 @@ NamedGuide bestGuide(std::vector<NamedGuide> guides, const deep::DenoisePlan& pl
   return std::move(guides[best]);
 }
 
-// Whether a guide of whole frames leaves memory for the frame `source` itself.
-bool fits(const GuidePlan& guide, FrameSource& source, size_t memory) {
-  const size_t pixels = source.part().dataWindow.area();
+bool fits(const GuidePlan& guide, size_t pixels, size_t memory) {
   const GuideBytes bytes = guideBytes(guide, pixels, memory);
   const size_t all = pixels * (bytes.madePerPixel + bytes.keptPerPixel) + bytes.library;
   return double(all) <= kMostOfMemory * double(workingBytes(memory));
@@ -138,6 +138,14 @@ GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory) {
   return bytes;
 }
 
+bool guideFits(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan, size_t pixels,
+               size_t memory) {
+  const size_t scratch = decodedLimit(memory);
+  if (choice == kNeuralBase) return fits(neuralGuide(base, plan, scratch), pixels, memory);
+  if (choice == kOidnBase) return fits(oidnGuide(flat::loadOidn(base.oidnLibrary), true, scratch), pixels, memory);
+  return true;
+}
+
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t memory, std::set<std::string>& notes) {
   if (choice == "none" || (choice == "auto" && plan.params.filter != deep::FilterKind::Own)) return {};
@@ -155,19 +163,17 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
     guides.push_back({"oidn with prefiltered guides", "Open Image Denoise", oidnGuide(library, true, scratch)});
     guides.push_back({"oidn", "Open Image Denoise", oidnGuide(library, false, scratch)});
   }
-  // In the place of Open Image Denoise it has to promise more than our own filter, which needs no whole frames.
-  const bool inItsPlace = guides.empty() && plan.params.quality == deep::Quality::Best;
-  if (choice == "auto" && (base.name == kAutoBase || inItsPlace) && hasModel(base))
+  if (choice == "auto" && (base.name == kAutoBase || guides.empty()) && hasModel(base))
     guides.push_back({"the network", "the network", neuralGuide(base, plan, scratch)});
   std::erase_if(guides, [&](const NamedGuide& guide) {
-    if (choice != "auto" || fits(guide.plan, source, memory)) return false;
+    if (choice != "auto" || fits(guide.plan, source.part().dataWindow.area(), memory)) return false;
     notes.insert(
         fmt::format("{}: no guide by {}: whole frames of it take more than the memory", source.path(), guide.who));
     return true;
   });
-  if (inItsPlace && !guides.empty()) guides.insert(guides.begin(), {"nlm", "Fathom's own filter", nlmGuide(plan)});
   if (guides.empty()) return plan.params.quality == deep::Quality::Best ? std::optional(nlmGuide(plan)) : std::nullopt;
-  NamedGuide best = guides.size() > 1 ? bestGuide(std::move(guides), plan, source) : std::move(guides.front());
+  if (guides.size() == 1) return std::move(guides.front().plan);
+  NamedGuide best = bestGuide(std::move(guides), plan, source);
   notes.insert(fmt::format("{}: bins are guided by {}, which promises the least error", source.path(), best.name));
   return std::move(best.plan);
 }

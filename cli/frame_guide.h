@@ -33,14 +33,20 @@ GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory);
 // Whether frames that offer this say enough of their noise to be guided.
 bool canBeGuided(const deep::DenoiseInputs& inputs);
 
+// Whether a guide of whole frames, nlm (which is none), neural or oidn, leaves memory for a frame of so many pixels itself.
+// Throws Error where its library or model cannot be had.
+bool guideFits(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan, size_t pixels,
+               size_t memory);
+
 // The plan for a choice: auto, nlm, neural, oidn, none (then there is none) or a file. `oidn` prefilters its own guides
-// where that promises the smaller error (cli/method_choice, on the middle of the first frame, `source`). `auto` is Open
-// Image Denoise where it is found: bins and pixels take of it what the noisy frame confirms, and gain even where it is
-// worse than our own filter (fur); where the base is to be chosen (kAutoBase), the network may promise less error and take
-// its place. Where it is not found, Quality::Best takes the network or our own flat filter, as they promise; the latter it makes the flattened frame as good as
-// any flat one, for two thirds more time. None for Quality::Fast, for published filters and for frames that say nothing of
-// their noise, nor where one that takes whole frames would need more than `memory` bytes for `source`. Adds to `notes` what
-// it chose. Throws Error where the choice cannot be had.
+// where that promises the smaller error (cli/method_choice, on the middle of the first frame, `source`). `neural` is
+// `base` where no model is named: `small` is no gain. `auto` is Open Image Denoise where it is found, else the network
+// where it is installed: bins and pixels take of a guide what the noisy frame confirms, and gain even where it is worse
+// than our own filter (fur). Where the base is to be chosen (kAutoBase), the network may promise less error than Open
+// Image Denoise and take its place. Both take whole frames; where that is more than `memory` bytes for `source`, or where
+// neither is there, Quality::Best takes our own flat filter, which makes the flattened frame as good as any flat one, for
+// two thirds more time. No guide for Quality::Fast, for published filters and for frames that say nothing of their noise.
+// Adds to `notes` what it chose, where there was a choice, and what did not fit. Throws Error where the choice cannot be had.
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t memory, std::set<std::string>& notes);
 

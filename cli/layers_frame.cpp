@@ -125,7 +125,7 @@ flat::Image LayersFrame::flattened(const Progress& progress) {
 }
 
 GuidePlan layersGuide(const LayersPlan& plan, const SourceOptions& options, bool cameraSamples) {
-  GuidePlan guide{{}, true, plan.settings};
+  GuidePlan guide{{{}, {}, deep::kNetworkGuide}, true, plan.settings};
   guide.flattened = [plan, options, cameraSamples](const FrameInputs& inputs, const Progress& progress) {
     return LayersFrame(plan, inputs, options, cameraSamples).flattened(progress);
   };

@@ -14,7 +14,7 @@ using deep::Quality;
 // The share of the time of our own filters that is left where the colour is one component (staircase2 at 8 samples).
 constexpr double kOneComponent = 0.75;
 
-// How much longer the network takes in float32 than in bfloat16 (`./run bench nn`).
+// How much longer our network takes in float32 than in bfloat16 (`./run bench nn`).
 constexpr double kFloat32 = 2.1;
 
 // What `./run bench pareto FOLDER 0.25 2` printed as "For cli/time_budget.cpp" for the eight renders of the README, on two
@@ -27,6 +27,9 @@ const std::vector<SettingCost>& table() {
       {{Quality::Fast, true, "nlm"}, 1.71, 0.824, 0, 0.163},
       {{Quality::Balanced, true, "nlm"}, 2.18, 1.23, 0, 0.15},
       {{Quality::Best, true, "nlm"}, 4.35, 2.55, 0, 0.142},
+      {{Quality::Fast, true, "neural"}, 0.202, 0.824, 0.7, 0.129},
+      {{Quality::Balanced, true, "neural"}, 0.163, 1.23, 1.4, 0.128},
+      {{Quality::Best, true, "neural"}, 0.611, 2.55, 1.4, 0.127},
       {{Quality::Fast, true, "oidn"}, 0.202, 0.824, 13.8, 0.107},
       {{Quality::Balanced, true, "oidn"}, 0.163, 1.23, 13.8, 0.106},
       {{Quality::Best, true, "oidn"}, 0.611, 2.55, 13.8, 0.106},
@@ -72,10 +75,11 @@ std::vector<SettingCost> costsOf(bool deep, std::span<const std::string> with) {
 
 namespace {
 
-// The lights of flat frames go through our network one by one.
+// The lights of flat frames go through our network one by one; of deep ones those of the flattened frame and, where they
+// were measured, the pictures of two bins.
 double networkSeconds(const SettingCost& cost, const Workload& workload) {
   if (cost.setting.with != kNeuralBase) return cost.network;
-  const double lights = !cost.setting.deep && workload.components ? 2 : 1;
+  const double lights = cost.setting.deep ? (workload.components ? 1 : 0.75) : workload.components ? 2 : 1;
   const bool slower = cost.setting.quality == Quality::Fast && !workload.bfloat16;
   return cost.network * workload.networkWork * lights * (slower ? kFloat32 : 1);
 }

@@ -27,7 +27,8 @@ struct Workload {
 struct SettingCost {
   DenoiseSetting setting;
   double perMegapixel = 0, perMillionBins = 0;  // of Fathom's own filters
-  double network = 0;  // of Open Image Denoise or the network `small`, per megapixel, on flat frames of one light
+  double network =
+      0;  // of Open Image Denoise or a network as wide as `small`, per megapixel; of flat frames of one light
   double error =
       0;  // relMSE over that of the noisy frames: flattened, and of deep ones the geometric mean with per bin
 };

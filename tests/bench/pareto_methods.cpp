@@ -32,9 +32,9 @@ std::vector<Method> paretoMethods() {
   std::vector<Method> methods;
   const std::vector<std::pair<std::string, Quality>> qualities = {
       {"fast", Quality::Fast}, {"balanced", Quality::Balanced}, {"best", Quality::Best}};
-  for (const char* guide : {"none", "nlm", "oidn"})
+  for (const char* guide : {"none", "nlm", "neural", "oidn"})
     for (const auto& [name, quality] : qualities)
-      if (guide != std::string("oidn") || network)
+      if (guide == std::string("oidn") ? network : guide != std::string("neural") || cli::hasModel({}))
         methods.push_back(
             {name + (guide == std::string("none") ? "" : std::string(" + ") + guide), {quality, true, guide}});
   for (const auto& [name, quality] : qualities) methods.push_back({"nlm " + name, {quality, false, "nlm"}});

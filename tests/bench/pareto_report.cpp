@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cli/base_denoiser.h"
+
 namespace fathom::bench {
 namespace {
 
@@ -31,11 +33,13 @@ double secondsOf(const ParetoResult& result, const cli::DenoiseSetting& setting)
   return found ? found->secondsPerMegapixel : 0;
 }
 
-// What Open Image Denoise adds to a deep frame, whatever the quality: the mean over the qualities.
-double networkOfDeep(const ParetoResult& result) {
+// What Open Image Denoise adds to a deep frame, whatever the quality: the mean over the qualities. What our network adds to
+// one: that of `fast` multiplies in bfloat16.
+double networkOfDeep(const ParetoResult& result, const std::string& network, bool fast) {
   double sum = 0, count = 0;
   for (const Quality quality : {Quality::Fast, Quality::Balanced, Quality::Best})
-    if (const double guided = secondsOf(result, {quality, true, "oidn"}); guided > 0) {
+    if (const double guided = secondsOf(result, {quality, true, network});
+        guided > 0 && (network == "oidn" || (quality == Quality::Fast) == fast)) {
       sum += guided - secondsOf(result, {quality, true, "none"});
       ++count;
     }
@@ -55,9 +59,10 @@ Costs costsOf(const ParetoResult& result, const MethodResult& of) {
   const double more = std::max(0.01, result.binsPerPixel - 1);
   // Neither a pixel nor a bin costs less than nothing.
   const double perBin = std::clamp((alone - flat) / more, 0.0, alone / result.binsPerPixel);
-  const bool network = with == "oidn";
+  const bool network = with == "oidn" || with == "neural";
   const double ours = (network ? alone : seconds) - perBin * result.binsPerPixel;
-  return {ours > 1e-6 ? ours : 0, perBin, network ? networkOfDeep(result) : 0};
+  const double work = with == "neural" ? cli::networkWork({}, true) : 1;
+  return {ours > 1e-6 ? ours : 0, perBin, network ? networkOfDeep(result, with, quality == Quality::Fast) / work : 0};
 }
 
 const char* nameOf(Quality quality) {
@@ -121,7 +126,7 @@ std::string costRows(const ParetoResult& result) {
   std::string text;
   for (const MethodResult& of : result.methods) {
     const cli::DenoiseSetting& setting = of.method.setting;
-    if (of.method.plainGuides || (setting.with == "neural" && !setting.components)) continue;
+    if (of.method.plainGuides || (setting.with == "neural" && !setting.deep && !setting.components)) continue;
     const Costs costs = costsOf(result, of);
     const MeanErrors means = meansOf(of, kRendered);
     const double share = means.flattenedShare.value_or(1);

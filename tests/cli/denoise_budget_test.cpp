@@ -98,7 +98,7 @@ TEST(TimeBudget, TheNetworkCostsByItsLightsAndItsSize) {
 }
 
 TEST(TimeBudget, TheMeasurementHasEverySetting) {
-  const std::vector<std::string> guides = {"none", "nlm", "oidn"}, bases = {"nlm", "neural", "oidn"};
+  const std::vector<std::string> guides = {"none", "nlm", "neural", "oidn"}, bases = {"nlm", "neural", "oidn"};
   std::set<std::string> names;
   for (const bool isDeep : {true, false})
     for (const SettingCost& cost : cli::costsOf(isDeep, isDeep ? guides : bases)) {
@@ -106,7 +106,7 @@ TEST(TimeBudget, TheMeasurementHasEverySetting) {
       EXPECT_GT(expectedSeconds(cost, {}, 1), 0) << describeSetting(cost.setting);
       EXPECT_TRUE(cost.error > 0 && cost.error < 1) << describeSetting(cost.setting);
     }
-  EXPECT_EQ(names.size(), 9 + 3 + 2 + 6);
+  EXPECT_EQ(names.size(), 12 + 3 + 2 + 6);
   EXPECT_EQ(names.size(), cli::measuredCosts().size());
   EXPECT_GT(cli::measuredCalibration(), 0);
 }
@@ -152,7 +152,13 @@ struct Planned {
 
 TEST(DenoiseBudget, WhatTheOptionsLeaveOpen) {
   Planned planned;
-  EXPECT_THAT(planned.choice(), Not(HasSubstr("oidn"))) << "not installed";
+  EXPECT_EQ(planned.choice(), "--quality best --flat-guide neural") << "Open Image Denoise is not installed";
+  planned.request.base.model = "nowhere.safetensors";
+  EXPECT_EQ(planned.choice(), "--quality best --flat-guide nlm") << "neither is the network";
+  planned.request.base.model.clear();
+  planned.request.memory = 400'000'000;
+  EXPECT_EQ(planned.choice(), "--quality best --flat-guide nlm") << "a whole frame does not fit";
+  planned.request.memory = size_t(8) << 30;
   planned.request.guide = "none";
   EXPECT_EQ(planned.choice(), "--quality best --flat-guide none");
   planned.request.guide = "guide.exr";

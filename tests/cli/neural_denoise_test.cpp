@@ -152,19 +152,34 @@ TEST_F(NeuralDenoise, GuidesDeepFrames) {
   EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end()));
 }
 
-// At --quality best, where Open Image Denoise is not found, the network has to promise more than our own filter.
-TEST_F(NeuralDenoise, CompetesToGuideTheBestDeepFrames) {
+TEST_F(NeuralDenoise, GuidesWhereOpenImageDenoiseIsNotFound) {
   deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(40, 90, 1));
-  const Ran outcome = run("deep.exr -o auto.exr --quality best");
-  ASSERT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("bins are guided by"));
-  const std::string taken = outcome.err.find("guided by the network") != std::string::npos ? "neural" : "nlm";
-  ASSERT_EQ(run("deep.exr -o named.exr --quality best --flat-guide " + taken).status, 0);
-  EXPECT_EQ(bytes("auto.exr"), bytes("named.exr"));
+  const auto same = [&](const std::string& quality, const std::string& guide) {
+    const Ran outcome = run("deep.exr -o auto.exr --overwrite --quality " + quality);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(run(fmt::format("deep.exr -o named.exr --overwrite --quality {} --flat-guide {}", quality, guide)).status,
+              0);
+    EXPECT_EQ(bytes("auto.exr"), bytes("named.exr")) << quality;
+  };
+  same("fast", "none");
+  same("balanced", "neural");
+  same("best", "neural");
+  const Ran little = run("deep.exr -o auto.exr --overwrite --memory 8M");
+  EXPECT_THAT(little.err, HasSubstr("deep.exr: no guide by the network: whole frames of it take more than the memory"));
   std::filesystem::remove_all(folder_ / "models");
-  ASSERT_EQ(run("deep.exr -o alone.exr --quality best").status, 0);
-  ASSERT_EQ(run("deep.exr -o nlm.exr --quality best --flat-guide nlm").status, 0);
-  EXPECT_EQ(bytes("alone.exr"), bytes("nlm.exr"));
+  same("balanced", "none");
+  same("best", "nlm");
+}
+
+// `small` is no gain as a guide.
+TEST_F(NeuralDenoise, TheGuideIsBaseWhereNoModelIsNamed) {
+  deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(40, 40, 1));
+  std::filesystem::copy(folder_ / "models/small.safetensors", folder_ / "models/base.safetensors");
+  std::ofstream(folder_ / "models/small.safetensors") << "no weights";
+  EXPECT_EQ(run("deep.exr -o named.exr --flat-guide neural --model base").status, 0);
+  ASSERT_EQ(run("deep.exr -o guided.exr --flat-guide neural").status, 0);
+  EXPECT_EQ(bytes("named.exr"), bytes("guided.exr"));
+  EXPECT_EQ(run("in.exr -o flat.exr --method neural").status, 1);
 }
 
 TEST_F(NeuralDenoise, AutoTakesOneOfThem) {
@@ -210,8 +225,9 @@ TEST_F(NeuralDenoise, HasItsPlaceInATimeBudget) {
   const Ran automatic = run("in.exr -o auto.exr --method auto --time-budget 1000");
   ASSERT_EQ(automatic.status, 0) << automatic.err;
   EXPECT_THAT(run("in.exr -o auto.exr --method auto --time-budget 1000").out, HasSubstr("done before"));
-  const Ran deepOne = run("deep.exr -o d.exr --flat-guide neural --time-budget 10");
-  EXPECT_NE(deepOne.status, 0);
+  deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(40, 40, 1));
+  EXPECT_THAT(run("deep.exr -o d.exr --flat-guide neural --time-budget 1000").err,
+              HasSubstr("1000 s a frame allow --quality best --flat-guide neural, about"));
 }
 
 // Coefficients with which every block is worth as many components as can be, or one.
