@@ -68,9 +68,12 @@ TEST(Perturb, SharesAreOfVariancesAround) {
         for (const char* c : kRgbNames) {
           variance[k].clear();
           noisy.add(group + c, 0.25f);
-          Buffer<float>&a = noisy.add("half0." + group + c).values, &b = noisy.add("half1." + group + c).values;
-          Buffer<float>* told = nullptr;
-          if (k ? specularTold : diffuseTold) told = &noisy.add("variance." + group + c).values;
+          noisy.add("half0." + group + c);
+          noisy.add("half1." + group + c);
+          if (k ? specularTold : diffuseTold) noisy.add("variance." + group + c);
+          Buffer<float>&a = noisy.find("half0." + group + c)->values, &b = noisy.find("half1." + group + c)->values;
+          Plane* const plane = noisy.find("variance." + group + c);
+          Buffer<float>* told = plane ? &plane->values : nullptr;
           for (size_t i = 0; i < a.size(); ++i) {
             a[i] = 0.25f + 0.01f * float((7 * i + 3 * k) % 11);
             b[i] = 0.25f - 0.01f * float((5 * i + k) % 7);
