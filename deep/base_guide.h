@@ -63,8 +63,8 @@ struct BaseGuide {
   ConsistencyParams consistency;
 };
 
-// Runs the denoisers. `level`: the mean colour of the frame. Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws
-// Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
+// Runs the denoisers. `level`: the mean colour of the frame. Pictures of bins that hold less than a fiftieth of the light's
+// weight are not worth a run. Throws Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
 BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, float level, const Progress& progress = {});
 
 // The rows [y0, y1) of a guide.

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "deep/alpha.h"
 #include "deep/denoise_data.h"
+#include "flat/denoiser.h"
 
 namespace fathom::deep {
 
@@ -54,6 +55,7 @@ std::vector<flat::Image> binImages(const DeepImage& image, const DenoiseInputs& 
     flat::Image& picture = result.emplace_back(flat::Image{image.dataWindow, image.displayWindow, {}, {}});
     for (const std::string& name : names) picture.add(name);
     picture.add("A");
+    picture.add(flat::kAsked);
   }
   const std::span<const float> alpha = image.get("A");
   std::vector<std::span<const float>> planes;
@@ -64,8 +66,9 @@ std::vector<flat::Image> binImages(const DeepImage& image, const DenoiseInputs& 
     for (size_t i = size_t(k); i < result.size(); ++i) {
       for (size_t c = 0; c < planes.size(); ++c)
         result[i].planes[c].values[pixel] = finiteOrZero(planes[c][bin] * inverse);
-      result[i].planes.back().values[pixel] = 1;
+      result[i].planes[planes.size()].values[pixel] = 1;
     }
+    if (size_t(k) < result.size()) result[size_t(k)].planes.back().values[pixel] = 1;
   });
   return result;
 }

@@ -10,8 +10,8 @@
 namespace fathom::deep {
 
 // The k-th visible bin of every pixel, k = 0 .. count-1, and the last one of a pixel with fewer: R G B, albedo.* and N.*
-// where `inputs` has them, not premultiplied, and A (1, or 0 where nothing is seen). Every image is a whole picture with
-// the hard edges that depth has. A bin is visible that has a say (kLeastShare) and finite colours.
+// where `inputs` has them, not premultiplied, A (1, or 0 where nothing is seen) and flat::kAsked (1 where a pixel has a k-th bin).
+// Every image is a whole picture with the hard edges that depth has. A bin is visible that has a say (kLeastShare) and finite colours.
 std::vector<flat::Image> binImages(const DeepImage& image, const DenoiseInputs& inputs, int count);
 
 // The effective alpha of all k-th visible bins, k = 0 .. count-1.

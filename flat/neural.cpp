@@ -33,7 +33,7 @@ nn::TileParams tileParams(const nn::CompositionalNet& net, const NeuralParams& p
   return {.memory = params.memory, .least = std::max(params.components, 1), .most = mostComponents(net, params)};
 }
 
-// 1 where the render stays: it has converged, or there is nothing.
+// 1 where the render stays: it has converged, there is nothing, or nobody asks.
 Buffer<uint8_t> settledPixels(const Image& image) {
   const size_t pixels = image.dataWindow.area();
   Buffer<uint8_t> settled(pixels, 0);
@@ -41,6 +41,8 @@ Buffer<uint8_t> settledPixels(const Image& image) {
     const Noise noise = noiseOf(image);
     for (size_t i = 0; i < pixels; ++i) settled[i] = noise.pixel[i] == PixelNoise::Converged;
   }
+  if (const Plane* asked = image.find(kAsked))
+    for (size_t i = 0; i < pixels; ++i) settled[i] |= uint8_t(asked->values[i] == 0);
   const Plane* alpha = image.find("A");
   if (!alpha) return settled;
   const std::array<const float*, 3> rgb{image.get("R").values.data(), image.get("G").values.data(),

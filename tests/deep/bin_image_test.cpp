@@ -28,6 +28,7 @@ TEST(BinImage, ShowsTheKthBinOfEveryPixel) {
   for (size_t pixel = 0; pixel < image.pixels(); ++pixel)
     for (size_t k = 0; k < 3; ++k) {
       const size_t count = image.count(pixel);
+      ASSERT_EQ(pictures[k].get("asked").values[pixel], count > k ? 1 : 0);
       ASSERT_EQ(pictures[k].get("A").values[pixel], count > 0 ? 1 : 0);
       if (count == 0) {
         ASSERT_EQ(pictures[k].get("R").values[pixel], 0);

@@ -192,7 +192,6 @@ TEST(Neural, ConvergedAndEmptyPixelsKeepTheRender) {
   }
 }
 
-// Skipped tiles change nothing but the time.
 // Each of them is denoised: noise that is not known, black that is covered, light that is not, one channel of it.
 TEST(Neural, WhatIsNotSettledIsDenoised) {
   Image noisy = withoutComponents(withAlpha(makeNoisyFlat(24, 16, 1).noisy));
@@ -219,6 +218,7 @@ TEST(Neural, SettledPixelsAreTheWholeRender) {
   EXPECT_EQ(found.get("specular.G").values[50], 0);
 }
 
+// Skipped tiles change nothing but the time.
 TEST(Neural, TilesWithoutNoiseAreSkipped) {
   const Image noisy = withAlpha(makeNoisyFlat(512, 64, 6).noisy);
   Image half = noisy.copy();
@@ -246,6 +246,18 @@ TEST(Neural, TilesWithoutNoiseAreSkipped) {
         ASSERT_EQ(cut.get(c).values[i], std::max(half.get(c).values[i], 0.0f)) << x;
       }
     }
+}
+
+TEST(Neural, WhatNobodyAsksForIsSkipped) {
+  const Image noisy = withoutComponents(withAlpha(makeNoisyFlat(320, 64, 6).noisy));
+  Image part = noisy.copy();
+  Buffer<float>& asked = part.add(kAsked).values;
+  for (size_t i = 0; i < asked.size(); ++i) asked[i] = i % 320 < 100;
+  NeuralCounts counts;
+  const Image found = denoiseNeural(net(), {.components = 1}, part, {}, &counts);
+  EXPECT_EQ(counts.denoised, 100U * 64);
+  EXPECT_EQ(found.get("R").values[50 + 320], denoiseNeural(net(), {.components = 1}, noisy).get("R").values[50 + 320]);
+  EXPECT_EQ(found.get("R").values[200 + 320], std::max(noisy.get("R").values[200 + 320], 0.0f));
 }
 
 TEST(Neural, OddValuesNeverSpread) {
