@@ -20,7 +20,7 @@ struct Workload {
   int runs = 1;             // of the denoiser: an estimate of its errors takes further ones
   int flatRuns = 1;         // the same of Fathom's own filter on flat frames, which may tell its errors by itself
   double networkWork = 1;   // the arithmetic of the network that is at hand over that of `small`
-  bool bfloat16 = true;     // it multiplies in bfloat16 for Quality::Fast
+  bool bfloat16 = true;     // it multiplies in bfloat16 for Quality::Fast, and as a guide
 };
 
 // Seconds on the machine of the measurement, frames decoded and with all features.

@@ -33,13 +33,11 @@ double secondsOf(const ParetoResult& result, const cli::DenoiseSetting& setting)
   return found ? found->secondsPerMegapixel : 0;
 }
 
-// What Open Image Denoise adds to a deep frame, whatever the quality: the mean over the qualities. What our network adds to
-// one: that of `fast` multiplies in bfloat16.
-double networkOfDeep(const ParetoResult& result, const std::string& network, bool fast) {
+// What a network adds to a deep frame, whatever the quality: the mean over the qualities.
+double networkOfDeep(const ParetoResult& result, const std::string& network) {
   double sum = 0, count = 0;
   for (const Quality quality : {Quality::Fast, Quality::Balanced, Quality::Best})
-    if (const double guided = secondsOf(result, {quality, true, network});
-        guided > 0 && (network == "oidn" || (quality == Quality::Fast) == fast)) {
+    if (const double guided = secondsOf(result, {quality, true, network}); guided > 0) {
       sum += guided - secondsOf(result, {quality, true, "none"});
       ++count;
     }
@@ -62,7 +60,7 @@ Costs costsOf(const ParetoResult& result, const MethodResult& of) {
   const bool network = with == "oidn" || with == "neural";
   const double ours = (network ? alone : seconds) - perBin * result.binsPerPixel;
   const double work = with == "neural" ? cli::networkWork({}, true) : 1;
-  return {ours > 1e-6 ? ours : 0, perBin, network ? networkOfDeep(result, with, quality == Quality::Fast) / work : 0};
+  return {ours > 1e-6 ? ours : 0, perBin, network ? networkOfDeep(result, with) / work : 0};
 }
 
 const char* nameOf(Quality quality) {

@@ -10,11 +10,13 @@
 
 #include "base/error.h"
 #include "cli/model_files.h"
+#include "deep/base_guide.h"
 #include "deep/flat_nl_means.h"
 #include "deep/flat_noisy.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "deep/layers_results.h"
+#include "flat/gate.h"
 #include "flat/neural.h"
 #include "tests/bench/frames.h"
 #include "tests/bench/measure.h"
@@ -73,6 +75,17 @@ Method network(const std::string& model) {
   };
 }
 
+// As `fathom denoise` does where Open Image Denoise is not found.
+flat::Image guided(const Frame& frame) {
+  static const std::shared_ptr<const nn::CompositionalNet> net = cli::loadModel("base").net;
+  deep::DenoisePlan plan{inputsOf(frame.bins), {}, meanLevel(frame.bins)};
+  plan.guided = true;
+  const flat::Denoiser denoiser = flat::withGate(flat::neural(net, {.components = 1}));
+  const deep::BaseGuide guide =
+      makeGuide(guideInput(frame.bins, plan.inputs, true), {denoiser, denoiser, deep::kNetworkGuide}, plan.level);
+  return deep::flatten(deep::denoise(frame.bins.copy(), plan, {}, nullptr, &guide));
+}
+
 // Skips what is empty alone: it does not ask for the noise.
 Method layers() {
   return [net = cli::loadLayersModel(cli::kLayersModel).net](const Frame& frame) {
@@ -115,15 +128,15 @@ Table measured(const std::string& name, const Method& method, const std::vector<
   return table;
 }
 
-void run(const std::string& folder, const std::string& output) {
+void run(const std::string& folder, const std::string& output, const std::string& only) {
   const std::vector<Frame> frames = framesOf(deep::read(folder + "/sequence.0001.deep.exr"));
-  const std::pair<const char*, Method> methods[] = {{"Bins, NL-Means (balanced)", nlMeans},
-                                                    {"Pixels, NL-Means (balanced)", flatNlMeansOf},
-                                                    {"Pixels, network small, K = 1", network("small")},
-                                                    {"Pixels, network base, K = 1", network("base")},
-                                                    {"Bins, two layers", layers()}};
+  const std::pair<const char*, Method> methods[] = {
+      {"Bins, NL-Means (balanced)", nlMeans},           {"Bins, guided by base (balanced)", guided},
+      {"Pixels, NL-Means (balanced)", flatNlMeansOf},   {"Pixels, network small, K = 1", network("small")},
+      {"Pixels, network base, K = 1", network("base")}, {"Bins, two layers", layers()}};
   std::vector<Table> tables;
   for (const auto& [name, method] : methods) {
+    if (std::string(name).find(only) == std::string::npos) continue;
     tables.push_back(measured(fmt::format("{}, {}x{} pixels", name, kWidth, kHeight), method, frames));
     tables.back().print();
   }
@@ -135,8 +148,9 @@ void run(const std::string& folder, const std::string& output) {
 
 int main(int argc, char** argv) {
   try {
-    if (argc != 3) fathom::fail("usage: bench_skip FOLDER_OF_FRAMES OUTPUT_FOLDER");
-    fathom::bench::run(argv[1], argv[2]);
+    if (argc < 3 || argc > 4)
+      fathom::fail("usage: bench_skip FOLDER_OF_FRAMES OUTPUT_FOLDER [PART_OF_A_METHOD'S_NAME]");
+    fathom::bench::run(argv[1], argv[2], argc == 4 ? argv[3] : "");
   } catch (const std::exception& e) {
     fmt::print(stderr, "bench_skip: {}\n", e.what());
     return 1;
