@@ -19,7 +19,7 @@ using nn::Precision;
 
 constexpr int kRepeats = 5;
 constexpr int kTile = 192;
-constexpr int kFrame = 768;
+constexpr int kFrame = 1536;
 constexpr int kComponents[] = {1, 2, 4};
 
 struct Setting {
