@@ -22,6 +22,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "tests/reference/error_of.h"
 #include "tests/reference/openexr_deep.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/temporary_folder.h"
@@ -30,6 +31,7 @@ namespace fathom::deep {
 namespace {
 
 using reference::difference;
+using reference::errorOf;
 using reference::randomDeep;
 using reference::readWithOpenExr;
 using ::testing::HasSubstr;
@@ -44,16 +46,6 @@ DeepImage sample(unsigned seed = 1) {
 std::string bytesOf(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-template <class Call>
-std::string errorOf(const Call& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 struct Layout {

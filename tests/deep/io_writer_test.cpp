@@ -27,6 +27,7 @@
 
 #include "base/error.h"
 #include "deep/io.h"
+#include "tests/reference/error_of.h"
 #include "tests/reference/openexr_deep.h"
 #include "tests/reference/random_deep.h"
 #include "tests/reference/temporary_folder.h"
@@ -35,21 +36,13 @@ namespace fathom::deep {
 namespace {
 
 using reference::difference;
+using reference::errorOf;
 using reference::randomDeep;
 using reference::readWithOpenExr;
 using ::testing::HasSubstr;
 
 DeepImage sample() {
   return randomDeep({-7, 5, 30, 28}, {0, 0, 64, 48}, {{"A", PixelType::Half}, {"Z", PixelType::Float}});
-}
-
-std::string errorOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 std::string valueOf(const Imf::Attribute& attribute) {

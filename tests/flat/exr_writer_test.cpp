@@ -17,11 +17,13 @@
 #include <utility>
 
 #include "base/error.h"
+#include "tests/reference/error_of.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom::flat {
 namespace {
 
+using reference::errorOf;
 using ::testing::HasSubstr;
 
 // Planes whose values tell their place.
@@ -39,15 +41,6 @@ Image makeImage(const std::vector<std::string>& names = {"R", "A", "Z"}) {
 std::string bytesOf(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-std::string errorOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 Image rowsOf(const Image& image, int y0, int y1) {
