@@ -125,19 +125,24 @@ struct Mixed {
   Buffer<GateBin> gated;
   Buffer<float> second;
 
-  Mixed(const std::vector<std::array<float, 3>>& estimates) : bins(int(estimates.size()), 1, 1, 1) {
+  Mixed(const std::vector<std::array<float, 3>>& estimates, float prior = 0.5f, float samples = 4)
+      : bins(int(estimates.size()), 1, 1, 1) {
     bins.data.depth.value.emplace_back(estimates.size(), 0.0f);
     gated = Buffer<GateBin>(estimates.size(), {});
     second = Buffer<float>(3 * estimates.size());
     for (size_t b = 0; b < gated.size(); ++b) {
       const auto [first, other, noisy] = estimates[b];
-      gated[b].samples = 4;
+      gated[b].samples = samples;
       for (size_t c = 0; c < 3; ++c)
         gated[b].filtered[c] = first, gated[b].residual[c] = noisy - first, second[3 * b + c] = other;
     }
-    mixBins(bins.data, {second.data(), second.size()}, Buffer<uint8_t>(gated.size(), 0), 0.5f, 0.5f, gated);
+    mixBins(bins.data, {second.data(), second.size()}, Buffer<uint8_t>(gated.size(), 0), 0.5f, prior, gated);
   }
 };
+
+TEST(BinMix, WhereNothingTellsItIsThePrior) {
+  for (const float prior : {0.25f, 0.6f}) EXPECT_FLOAT_EQ(Mixed({{1, 2, 1}}, prior, 0).gated[0].filtered[0], 2 - prior);
+}
 
 TEST(BinMix, TakesTheEstimateThatTheNoisyBinsSay) {
   EXPECT_FLOAT_EQ(Mixed({{1, 2, 1}}).gated[0].filtered[0], 1);
