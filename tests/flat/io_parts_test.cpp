@@ -13,21 +13,14 @@
 
 #include "base/error.h"
 #include "flat/io.h"
+#include "tests/reference/flat_read_error.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom::flat {
 namespace {
 
+using reference::errorOf;
 using ::testing::HasSubstr;
-
-std::string errorOf(const std::string& path, const ReadOptions& options = {}) {
-  try {
-    read(path, options);
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
-}
 
 // A part of one channel, Y, all of one value, in a file of several.
 Imf::Header partHeader(const char* name, const std::string& type, int width, int height) {

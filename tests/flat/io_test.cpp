@@ -14,11 +14,13 @@
 #include <limits>
 
 #include "base/error.h"
+#include "tests/reference/flat_read_error.h"
 #include "tests/reference/temporary_folder.h"
 
 namespace fathom::flat {
 namespace {
 
+using reference::errorOf;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -34,15 +36,6 @@ Image makeImage() {
     for (size_t i = 0; i < plane.values.size(); ++i) plane.values[i] = step * float(i) - 7;
   }
   return image;
-}
-
-std::string errorOf(const std::string& path, const ReadOptions& options = {}) {
-  try {
-    read(path, options);
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
 }
 
 std::string readBytes(const std::string& path) {
