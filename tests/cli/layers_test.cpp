@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "cli/layers_frame.h"
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "flat/io.h"
@@ -95,6 +96,13 @@ TEST_F(LayersDenoise, WritesLayersAndAFlatFrame) {
   }
   expectFine(run("in.exr -o four.exr --as layers --layers 4"));
   EXPECT_GT(read("four.exr").samples(), read("layers.exr").samples());
+}
+
+// It errs more than what the defaults of a guide are for.
+TEST_F(LayersDenoise, BinsFollowItAsANetworkOfOurs) {
+  const cli::LayersPlan plan =
+      cli::planLayers({.model = folder_ / "models/layers.safetensors"}, {}, deep::Quality::Balanced, size_t(1) << 30);
+  EXPECT_EQ(cli::layersGuide(plan, {}, false).denoisers.consistency.mix.prior, deep::kNetworkGuide.mix.prior);
 }
 
 // What the viewer reads of a file, and what other commands make of it.

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "cli/base_denoiser.h"
+#include "cli/frame_guide.h"
 #include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
 #include "deep/flatten.h"
@@ -180,6 +181,22 @@ TEST_F(NeuralDenoise, TheGuideIsBaseWhereNoModelIsNamed) {
   ASSERT_EQ(run("deep.exr -o guided.exr --flat-guide neural").status, 0);
   EXPECT_EQ(bytes("named.exr"), bytes("guided.exr"));
   EXPECT_EQ(run("in.exr -o flat.exr --method neural").status, 1);
+}
+
+// It errs more than what the defaults of a guide are for.
+TEST_F(NeuralDenoise, BinsFollowItAsANetworkOfOurs) {
+  deep::write(folder_ / "deep.exr", reference::makeNoisyFrame(40, 40, 1));
+  cli::FrameInputs inputs;
+  inputs.main = folder_ / "deep.exr";
+  cli::FrameSource source(inputs, {});
+  deep::DenoisePlan plan;
+  plan.inputs.variance = true;
+  std::set<std::string> notes;
+  const cli::BaseOptions network{.model = folder_ / "models/small.safetensors"};
+  const std::optional<cli::GuidePlan> guide = cli::planGuide("neural", network, plan, source, size_t(1) << 30, notes);
+  ASSERT_TRUE(guide);
+  EXPECT_EQ(guide->denoisers.consistency.mix.prior, deep::kNetworkGuide.mix.prior);
+  EXPECT_EQ(guide->denoisers.consistency.binPrior, deep::kNetworkGuide.binPrior);
 }
 
 TEST_F(NeuralDenoise, AutoTakesOneOfThem) {
