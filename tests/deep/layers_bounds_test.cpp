@@ -42,6 +42,64 @@ TEST(LayersBounds, TheLeastMemoryHoldsABandATileAndWhatIsReadAtOnce) {
     }
 }
 
+// The largest tile of which four take no more than half of the memory, and rows halved until they fit beside one.
+TEST(LayersBounds, BandsAreAsHighAsMemoryAllows) {
+  const nn::LayersNet net = reference::randomNet();
+  const auto up = [](int side) { return (side + 3) / 4 * 4; };
+  const auto tileBytes = [&](int tile) {
+    return net.tileBytes() * std::pow(tile + 2.0 * std::max(net.contextHalo(), net.filterHalo()), 2);
+  };
+  size_t cut = 0, whole = 0;
+  for (const auto& [width, height] : {std::pair{2002, 1717}, {300, 200}})
+    for (const int lights : {1, 2})
+      for (const double factor : {1.0, 1.3, 2.0, 3.0, 5.0, 9.0, 20.0, 60.0}) {
+        const Box window{-3, 7, width - 3, height + 7};
+        const size_t memory = size_t(factor * double(leastLayersBytes(net, 2, lights, window)));
+        const double free = double(memory) - std::clamp(double(memory) / 8, double(1 << 20), double(128 << 20));
+        double tile = tileBytes(64);
+        for (const int side : {128, 256, 384, 512})
+          if (4 * tileBytes(side) <= free / 2) tile = tileBytes(side);
+        const auto needed = [&](int rows) {
+          return up(width) *
+                 (std::min(rows + 2 * net.halo(), up(height)) * net.bandBytes(2, lights) + rows * 6.0 * sizeof(float));
+        };
+        int rows = up(height);
+        while (rows > 4 && needed(rows) > free - tile) rows = up(rows / 2);
+        LayerScale scale;
+        scale.lights.resize(size_t(lights));
+        const auto bands = layersBands(net, {.layers = 2, .memory = memory}, scale, window);
+        ASSERT_EQ(bands.size(), size_t((height + rows - 1) / rows)) << width << " " << lights << " " << factor;
+        EXPECT_EQ(bands.front(), std::pair(7, 7 + std::min(rows, height)));
+        EXPECT_EQ(bands.back().second, height + 7);
+        ++(rows < height ? cut : whole);
+      }
+  EXPECT_GT(cut, 8u);
+  EXPECT_GT(whole, 4u);
+}
+
+// Rows are read together up to an eighth of the memory, from 1 to 128 MB.
+TEST(LayersBounds, WhatIsReadAtOnceFollowsTheMemory) {
+  const DeepImage image = makeNoisyFrame(16, 64, 1);
+  LayerSource source = layerSource(image);
+  source.bytes = [](int y0, int y1) { return size_t(y1 - y0) * 700'000; };
+  std::vector<int> read;
+  source.read = [&](int y0, int y1) {
+    read.push_back(y1 - y0);
+    return rows(image, y0, y1);
+  };
+  const auto most = [&](size_t memory) {
+    read.clear();
+    measureLayers(source, {.memory = memory});
+    return *std::ranges::max_element(read);
+  };
+  EXPECT_EQ(most(1'000'000), 1);
+  EXPECT_EQ(most(size_t(40) << 20), 7);  // of 5 MB
+  EXPECT_EQ(most(0), 64);                // all 45 MB
+  source.bytes = [](int y0, int y1) { return size_t(y1 - y0) * 10'000'000; };
+  EXPECT_EQ(most(size_t(9) << 30), 13);  // of 128 MB
+  EXPECT_EQ(most(0), 13);
+}
+
 TEST(LayersBounds, LightComesBackToWholeFramesOnly) {
   const DeepImage image = makeNoisyFrame(64, 48, 1);
   const nn::LayersNet net = reference::randomNet();
