@@ -43,12 +43,12 @@ flat::Denoiser fileDenoiser(const std::string& path) {
 }
 
 // A frame's flat input from rows [y0, y1), read in pieces.
-deep::GuideInput readInput(FrameSource& source, int y0, int y1, int rowsAtOnce, const deep::DenoiseInputs& inputs,
+deep::GuideInput readInput(FrameSource& source, int y0, int y1, int rowsAtOnce, const deep::DenoisePlan& plan,
                            bool withBins) {
   std::set<std::string> told;
   std::optional<deep::GuideInput> result;
   for (int y = y0; y < y1; y += rowsAtOnce) {
-    deep::GuideInput piece = deep::guideInput(source.read(y, std::min(y + rowsAtOnce, y1), told), inputs, withBins);
+    deep::GuideInput piece = deep::guideInput(source.read(y, std::min(y + rowsAtOnce, y1), told), plan, withBins);
     if (result)
       deep::appendRows(*result, piece);
     else
@@ -84,9 +84,9 @@ GuidePlan neuralGuide(const BaseOptions& options, deep::DenoisePlan plan, size_t
   return {{base.denoise, base.denoise, deep::kNetworkGuide}, true, base.settings, base.bytes};
 }
 
-flat::Image sampleOf(FrameSource& source, const deep::DenoiseInputs& inputs) {
+flat::Image sampleOf(FrameSource& source, const deep::DenoisePlan& plan) {
   const Box middle = middleOf(source.part().dataWindow);
-  const deep::GuideInput input = readInput(source, middle.y0, middle.y1, kRowsOfSample, inputs, false);
+  const deep::GuideInput input = readInput(source, middle.y0, middle.y1, kRowsOfSample, plan, false);
   return flat::crop(input.noisy, middle);
 }
 
@@ -96,7 +96,7 @@ struct NamedGuide {
 };
 
 NamedGuide bestGuide(std::vector<NamedGuide> guides, const deep::DenoisePlan& plan, FrameSource& source) {
-  const flat::Image middle = sampleOf(source, plan.inputs);
+  const flat::Image middle = sampleOf(source, plan);
   size_t best = 0;
   double least = 0;
   for (size_t i = 0; i < guides.size(); ++i) {
@@ -183,15 +183,15 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
 deep::BaseGuide guideOf(const deep::DeepImage& image, const GuidePlan& guide, const FrameInputs& inputs,
                         const deep::DenoisePlan& plan, const Progress& progress) {
   const deep::GuideDenoisers denoisers = denoisersOf(guide, inputs);
-  return deep::makeGuide(deep::guideInput(image, plan.inputs, bool(denoisers.bins)), denoisers, plan.level, progress);
+  return deep::makeGuide(deep::guideInput(image, plan, bool(denoisers.bins)), denoisers, plan, progress);
 }
 
 deep::BaseGuide readGuide(FrameSource& source, int rowsAtOnce, const GuidePlan& guide, const FrameInputs& inputs,
                           const deep::DenoisePlan& plan) {
   const Box& window = source.part().dataWindow;
   const deep::GuideDenoisers denoisers = denoisersOf(guide, inputs);
-  return deep::makeGuide(readInput(source, window.y0, window.y1, rowsAtOnce, plan.inputs, bool(denoisers.bins)),
-                         denoisers, plan.level, {});
+  return deep::makeGuide(readInput(source, window.y0, window.y1, rowsAtOnce, plan, bool(denoisers.bins)), denoisers,
+                         plan, {});
 }
 
 }  // namespace fathom::cli

@@ -48,10 +48,11 @@ struct GuideInput {
   flat::Image noisy;
   std::vector<flat::Image> bins;  // none, or kMostBinImages
   std::vector<double> shares;     // of bins' effective alpha, by image
+  Buffer<uint8_t> calm;           // deep/still's pixels without noise of their own; empty where no bins are guided
 };
 
 // `withBins`: bins are guided, too. The image follows DATA.md, as `denoise` takes it.
-GuideInput guideInput(const DeepImage& image, const DenoiseInputs& inputs, bool withBins);
+GuideInput guideInput(const DeepImage& image, const DenoisePlan& plan, bool withBins);
 
 // Puts the rows of `below` under those of `above`.
 void appendRows(GuideInput& above, const GuideInput& below);
@@ -63,9 +64,10 @@ struct BaseGuide {
   ConsistencyParams consistency;
 };
 
-// Runs the denoisers. `level`: the mean colour of the frame. Pictures of bins that hold less than a fiftieth of the light's
-// weight are not worth a run. Throws Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
-BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, float level, const Progress& progress = {});
+// Runs the denoisers, asking for nothing (flat::kAsked) that no pixel with noise in reach of the plan's filter can see.
+// Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
+BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, const DenoisePlan& plan,
+                    const Progress& progress = {});
 
 // The rows [y0, y1) of a guide.
 BaseGuide guideRows(const BaseGuide& guide, int y0, int y1);

@@ -83,6 +83,35 @@ PixelNoise noiseOfFile(const DenoiseData& data, const FileNoise& file, size_t pi
   return noise;
 }
 
+std::vector<std::span<const float>> allColours(const DeepImage& image) {
+  std::vector<std::span<const float>> colours;
+  for (const char* prefix : {"", "diffuse.", "specular."})
+    for (const char* letter : {"R", "G", "B"})
+      if (const auto values = image.tryGet(prefix + std::string(letter)); !values.empty()) colours.push_back(values);
+  return colours;
+}
+
+// Without colour, and no camera sample counts for it.
+bool isBlank(const DenoiseData& data, const std::vector<std::span<const float>>& colours, size_t pixel) {
+  for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
+    if (data.count[b] > 0 || std::ranges::any_of(colours, [&](const auto& values) { return values[b] != 0; }))
+      return false;
+  return true;
+}
+
+// A sample that is not finite says nothing here and asks for the filter all the same.
+bool isDumb(const DenoiseData& data, const DenoiseComponent& component, size_t b) {
+  const float* v = component.data.data() + 8 * b;
+  return !(v[3] + v[7] > 0) && data.weight[b] > 0;
+}
+
+bool hasDumb(const DenoiseData& data, size_t pixel) {
+  for (const DenoiseComponent& component : data.components)
+    for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
+      if (isDumb(data, component, b)) return true;
+  return false;
+}
+
 Box around(const DenoiseData& data, const Box& tile, int reach) {
   return intersect({tile.x0 - reach, tile.y0 - reach, tile.x1 + reach, tile.y1 + reach},
                    {0, 0, data.width, data.height});
@@ -111,54 +140,50 @@ Buffer<uint8_t> allWithin(const Buffer<uint8_t>& flags, int width, int height, i
   return result;
 }
 
-Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
-                      const DenoiseInputs& inputs, int radius, float level) {
-  const size_t width = size_t(data.width), pixels = width * size_t(data.height);
-  Activity activity{{}, Buffer<uint8_t>(pixels)};
+Buffer<uint8_t> calmPixels(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
+                           const DenoiseInputs& inputs, float level) {
   FileNoise file;
   if (inputs.variance) {
     file.variance = {image.get("variance.R"), image.get("variance.G"), image.get("variance.B")};
     file.colour = {image.get("R"), image.get("G"), image.get("B")};
     file.alpha = image.get("A");
   }
-  const auto isCalm = [&](size_t pixel, int x, int y) {
+  const auto isQuiet = [&](size_t pixel, int x, int y) {
     for (size_t c = 0; c < data.components.size() && data.halves; ++c)
       if (!noiseOfHalves(data, data.components[c], pixel).quiet(level)) return false;
     if (inputs.variance) return noiseOfFile(data, file, pixel).quiet(level);
     return data.halves || quietGuides(guides, x, y, level);
   };
-  std::vector<std::span<const float>> colours;
-  for (const char* prefix : {"", "diffuse.", "specular."})
-    for (const char* letter : {"R", "G", "B"})
-      if (const auto values = image.tryGet(prefix + std::string(letter)); !values.empty()) colours.push_back(values);
-  const auto isBlank = [&](size_t pixel) {
-    for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b)
-      if (data.count[b] > 0 || std::ranges::any_of(colours, [&](const auto& values) { return values[b] != 0; }))
-        return false;
-    return true;
-  };
-  Buffer<uint8_t> calm(pixels);
+  const std::vector<std::span<const float>> colours = allColours(image);
+  const size_t width = size_t(data.width);
+  Buffer<uint8_t> calm(width * size_t(data.height));
   parallelFor(0, data.height, [&](int y) {
     for (int x = 0; x < data.width; ++x) {
       const size_t pixel = size_t(y) * width + size_t(x);
-      const bool blank = isBlank(pixel);
-      calm[pixel] = blank || isCalm(pixel, x, y);
-      activity.light[pixel] = 0;
+      calm[pixel] = isBlank(data, colours, pixel) || (!hasDumb(data, pixel) && isQuiet(pixel, x, y));
+    }
+  });
+  return calm;
+}
+
+Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
+                      const DenoiseInputs& inputs, int radius, float level) {
+  const size_t width = size_t(data.width), pixels = width * size_t(data.height);
+  Activity activity{allWithin(calmPixels(data, guides, image, inputs, level), data.width, data.height, radius),
+                    Buffer<uint8_t>(pixels, 0)};
+  const std::vector<std::span<const float>> colours = allColours(image);
+  parallelFor(0, data.height, [&](int y) {
+    for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel) {
+      if (data.offsets[pixel] == data.offsets[pixel + 1]) activity.still[pixel] = 1;
+      const bool blank = isBlank(data, colours, pixel);
       for (size_t c = 0; c < data.components.size(); ++c)
         for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
           const float* v = data.components[c].data.data() + 8 * b;
-          // A sample that is not finite says nothing here and asks for the filter all the same.
-          const bool dumb = !blank && !(v[3] + v[7] > 0) && data.weight[b] > 0;
-          if (dumb) calm[pixel] = 0;
-          if (dumb || v[0] != 0 || v[1] != 0 || v[2] != 0 || v[4] != 0 || v[5] != 0 || v[6] != 0)
+          const bool lit = v[0] != 0 || v[1] != 0 || v[2] != 0 || v[4] != 0 || v[5] != 0 || v[6] != 0;
+          if (lit || (!blank && isDumb(data, data.components[c], b)))
             activity.light[pixel] = uint8_t(activity.light[pixel] | 1u << c);
         }
     }
-  });
-  activity.still = allWithin(calm, data.width, data.height, radius);
-  parallelFor(0, data.height, [&](int y) {
-    for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel)
-      if (data.offsets[pixel] == data.offsets[pixel + 1]) activity.still[pixel] = 1;
   });
   return activity;
 }

@@ -17,7 +17,12 @@ struct Activity {
   Buffer<uint8_t> light;
 };
 
-// `guides`: one per component. `level`: the mean colour of the frame.
+// 1 where a pixel's own noise is not seen (see Activity::still), or there is nothing. `guides`: one per component; none where
+// the file has half buffers or variances, which tell more. `level`: the mean colour of the frame.
+Buffer<uint8_t> calmPixels(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
+                           const DenoiseInputs& inputs, float level);
+
+// As calmPixels.
 Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> guides, const DeepImage& image,
                       const DenoiseInputs& inputs, int radius, float level);
 

@@ -82,7 +82,7 @@ flat::Image guided(const Frame& frame) {
   plan.guided = true;
   const flat::Denoiser denoiser = flat::withGate(flat::neural(net, {.components = 1}));
   const deep::BaseGuide guide =
-      makeGuide(guideInput(frame.bins, plan.inputs, true), {denoiser, denoiser, deep::kNetworkGuide}, plan.level);
+      makeGuide(guideInput(frame.bins, plan, true), {denoiser, denoiser, deep::kNetworkGuide}, plan);
   return deep::flatten(deep::denoise(frame.bins.copy(), plan, {}, nullptr, &guide));
 }
 

@@ -62,7 +62,7 @@ class Frame {
   }
 
   BaseGuide guideOf(const GuideDenoisers& denoisers) const {
-    return makeGuide(guideInput(noisy, plan.inputs, bool(denoisers.bins)), denoisers, plan.level);
+    return makeGuide(guideInput(noisy, plan, bool(denoisers.bins)), denoisers, plan);
   }
   DeepImage guided(const BaseGuide& guide) const { return denoise(noisy.copy(), guidedPlan, {}, nullptr, &guide); }
 

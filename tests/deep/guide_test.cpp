@@ -64,8 +64,7 @@ class Guided : public ::testing::Test {
   const flat::Image truth = flatten(frame.truth);
 
   DeepImage guided(const GuideDenoisers& denoisers) const {
-    const BaseGuide guide =
-        makeGuide(guideInput(frame.noisy, plan.inputs, bool(denoisers.bins)), denoisers, plan.level);
+    const BaseGuide guide = makeGuide(guideInput(frame.noisy, plan, bool(denoisers.bins)), denoisers, plan);
     return denoise(frame.noisy.copy(), plan, {}, nullptr, &guide);
   }
 };
@@ -121,7 +120,7 @@ TEST_F(Guided, AComponentWithoutLightStaysDark) {
       std::copy(diffuse.begin(), diffuse.end(), whole.begin());
       std::ranges::fill(image.get(fmt::format("{}specular.{}", half, name)), 0.0f);
     }
-  const BaseGuide guide = makeGuide(guideInput(image, plan.inputs, false), {knows(truth), {}, {}}, plan.level);
+  const BaseGuide guide = makeGuide(guideInput(image, plan, false), {knows(truth), {}, {}}, plan);
   const DeepImage out = denoise(image.copy(), plan, {}, nullptr, &guide);
   for (const std::string name : kNames)
     for (const float v : out.get("specular." + name)) ASSERT_EQ(v, 0);
@@ -135,7 +134,7 @@ TEST_F(Guided, WhatHasNoSayKeepsNoPixelFromItsGuide) {
   const size_t poisoned = noisy.offsets[30 * 64 + 30];
   for (Channel& channel : noisy.channels)
     if (channel.name.ends_with(".R") || channel.name == "R") channel.values[poisoned] = std::nanf("");
-  const BaseGuide guide = makeGuide(guideInput(noisy, plan.inputs, false), {knows(answer), {}, {}}, plan.level);
+  const BaseGuide guide = makeGuide(guideInput(noisy, plan, false), {knows(answer), {}, {}}, plan);
   const flat::Image before = flatten(denoise(noisy.copy(), plan)),
                     after = flatten(denoise(noisy.copy(), plan, {}, nullptr, &guide));
   double unguided = 0, guided = 0;
@@ -157,7 +156,7 @@ TEST_F(Guided, BandsOfRowsGiveTheSameBits) {
   const Box& box = frame.noisy.dataWindow;
   for (const auto& [y0, y1] : {std::pair{box.y0, box.y0 + 9}, {box.y0 + 20, box.y0 + 21}, {box.y1 - 5, box.y1}}) {
     const DeepImage band = rows(frame.noisy, std::max(y0 - halo, box.y0), std::min(y1 + halo, box.y1));
-    const BaseGuide guide = makeGuide(guideInput(band, plan.inputs, false), {own, {}, kOwnGuide}, plan.level);
+    const BaseGuide guide = makeGuide(guideInput(band, plan, false), {own, {}, kOwnGuide}, plan);
     const DeepImage part = rows(denoise(band.copy(), plan, {}, nullptr, &guide), y0, y1);
     const DeepImage expected = rows(whole, y0, y1);
     for (const Channel& channel : expected.channels) {
@@ -170,12 +169,13 @@ TEST_F(Guided, BandsOfRowsGiveTheSameBits) {
 
 TEST_F(Guided, GuidesOfPiecesAreThatOfTheWhole) {
   const Box& box = frame.noisy.dataWindow;
-  GuideInput pieces = guideInput(rows(frame.noisy, box.y0, box.y0 + 13), plan.inputs, true);
-  appendRows(pieces, guideInput(rows(frame.noisy, box.y0 + 13, box.y1), plan.inputs, true));
-  const GuideInput whole = guideInput(frame.noisy, plan.inputs, true);
+  GuideInput pieces = guideInput(rows(frame.noisy, box.y0, box.y0 + 13), plan, true);
+  appendRows(pieces, guideInput(rows(frame.noisy, box.y0 + 13, box.y1), plan, true));
+  const GuideInput whole = guideInput(frame.noisy, plan, true);
   ASSERT_EQ(pieces.noisy.dataWindow, whole.noisy.dataWindow);
   for (const flat::Plane& plane : whole.noisy.planes)
     EXPECT_EQ(0, std::memcmp(plane.values.data(), pieces.noisy.get(plane.name).values.data(), plane.values.size() * 4));
+  EXPECT_TRUE(std::ranges::equal(pieces.calm, whole.calm));
   for (size_t k = 0; k < whole.bins.size(); ++k) {
     EXPECT_NEAR(pieces.shares[k], whole.shares[k], 1e-9 * (1 + whole.shares[k]));
     for (const flat::Plane& plane : whole.bins[k].planes)
@@ -188,14 +188,14 @@ TEST_F(Guided, HalvesAloneTellTheNoise) {
   DeepImage image = frame.noisy.copy();
   std::erase_if(image.channels, [](const Channel& channel) { return channel.name.starts_with("variance."); });
   const DenoisePlan halves = guidedPlan(image);
-  const BaseGuide guide = makeGuide(guideInput(image, halves.inputs, false), {knows(truth), {}, {}}, halves.level);
+  const BaseGuide guide = makeGuide(guideInput(image, halves, false), {knows(truth), {}, {}}, halves);
   const Errors before = errorsOf(denoise(image.copy(), halves), frame.truth);
   EXPECT_LT(errorsOf(denoise(image.copy(), halves, {}, nullptr, &guide), frame.truth).flat, 0.5 * before.flat);
 }
 
 // Pictures that show hardly anything are not worth a run.
 TEST_F(Guided, FewBinsHaveNoPicture) {
-  GuideInput input = guideInput(frame.noisy, plan.inputs, true);
+  GuideInput input = guideInput(frame.noisy, plan, true);
   ASSERT_GE(input.shares.size(), 2u);
   std::ranges::fill(input.shares, 0.01);
   input.shares[0] = 1;
@@ -204,8 +204,59 @@ TEST_F(Guided, FewBinsHaveNoPicture) {
     ++runs;
     return knows(truth)(noisy, progress);
   };
-  EXPECT_EQ(makeGuide(std::move(input), {knows(truth), bins, {}}, plan.level).bins.size(), 1u);
+  EXPECT_EQ(makeGuide(std::move(input), {knows(truth), bins, {}}, plan).bins.size(), 1u);
   EXPECT_EQ(runs, 1);
+}
+
+// Where nothing is noisy bins keep their colours, and what a guide says is never seen: it may be anything.
+TEST(GuideAsks, WhereTheDeepFilterWorks) {
+  for (const bool variances : {true, false}) {
+    reference::RenderedFrame frame =
+        reference::renderFrame({.width = 120, .height = 40, .noise = [](int x, int) { return x < 60 ? 0.0f : 0.7f; }});
+    if (!variances)
+      std::erase_if(frame.noisy.channels, [](const Channel& channel) { return channel.name.starts_with("variance."); });
+    const DenoisePlan plan = guidedPlan(frame.noisy);
+    size_t least = frame.noisy.pixels(), most = 0;
+    const auto denoiser = [&](float elsewhere) {
+      return [&, elsewhere](const flat::Image& noisy, const Progress&) {
+        flat::Image result{noisy.dataWindow, noisy.displayWindow, {}, {}};
+        const Buffer<float>& asked = noisy.get(flat::kAsked).values;
+        size_t count = 0;
+        for (const char* name : kNames) {
+          const Buffer<float>& from = noisy.get(name).values;
+          Buffer<float>& to = result.add(name).values;
+          for (size_t i = 0; i < to.size(); ++i) to[i] = asked[i] != 0 ? 0.9f * from[i] : elsewhere;
+        }
+        for (const float pixel : asked) count += pixel != 0;
+        least = std::min(least, count), most = std::max(most, count);
+        return result;
+      };
+    };
+    const auto result = [&](float elsewhere) {
+      const BaseGuide guide =
+          makeGuide(guideInput(frame.noisy, plan, true), {denoiser(elsewhere), denoiser(elsewhere), {}}, plan);
+      return denoise(frame.noisy.copy(), plan, {}, nullptr, &guide);
+    };
+    const DeepImage expected = result(0), found = result(1e4f);
+    EXPECT_LT(most, frame.noisy.pixels() * 3 / 4) << variances;
+    EXPECT_GT(most, frame.noisy.pixels() / 2) << variances;
+    EXPECT_GT(least, 0u);
+    for (const char* name : kNames)
+      EXPECT_EQ(0, std::memcmp(found.get(name).data(), expected.get(name).data(), found.samples() * sizeof(float)))
+          << name << " " << variances;
+  }
+}
+
+TEST(GuideAsks, ForNothingOfAFrameWithoutNoise) {
+  const reference::RenderedFrame frame = reference::renderFrame({.noise = [](int, int) { return 0.0f; }});
+  const DenoisePlan plan = guidedPlan(frame.noisy);
+  const flat::Denoiser never = [](const flat::Image&, const Progress&) -> flat::Image {
+    throw std::logic_error("asked");
+  };
+  const BaseGuide guide = makeGuide(guideInput(frame.noisy, plan, true), {never, never, {}}, plan);
+  const DeepImage out = denoise(frame.noisy.copy(), plan, {}, nullptr, &guide);
+  for (const char* name : kNames)
+    EXPECT_EQ(0, std::memcmp(out.get(name).data(), frame.noisy.get(name).data(), out.samples() * sizeof(float)));
 }
 
 TEST_F(Guided, TheGuideIsGatedOnce) {

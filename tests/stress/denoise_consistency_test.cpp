@@ -32,8 +32,7 @@ TEST(StressConsistency, EqualsItsFormula) {
             extremeDeep({.width = width, .height = height, .seed = unsigned(round), .largest = largest});
         const DenoisePlan plan = stress::planFor(image);
         DenoiseData data = prepareColours(image, plan.inputs);
-        const BaseGuide guide =
-            makeGuide(guideInput(image, plan.inputs, false), {reference::boxDenoiser(), {}, {}}, plan.level);
+        const BaseGuide guide = makeGuide(guideInput(image, plan, false), {reference::boxDenoiser(), {}, {}}, plan);
         stress::Draw draw(unsigned(round) + 3);
         Buffer<float> colours(3 * data.bins());
         Buffer<flat::GateVerdict> gates(data.bins());

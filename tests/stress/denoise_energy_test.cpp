@@ -106,7 +106,7 @@ TEST_P(StressEnergy, OfOurFilters) {
   DenoisePlan plan = stress::planFor(bins);
   plan.guided = true;
   const BaseGuide guide =
-      makeGuide(guideInput(bins, plan.inputs, false), {flatNlMeans(planFlattened(plan)), {}, kOwnGuide}, plan.level);
+      makeGuide(guideInput(bins, plan, false), {flatNlMeans(planFlattened(plan)), {}, kOwnGuide}, plan);
   expectLight("own, guided", flatten(denoise(bins.copy(), plan, {}, nullptr, &guide)));
   expectLight("flat own", flatNlMeans(planFlat(noisy, {}))(noisy, {}));
 }

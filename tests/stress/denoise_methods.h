@@ -39,7 +39,7 @@ inline deep::DeepImage run(const deep::DeepImage& image, const deep::DenoisePlan
   if (!plan.guided) return deep::denoise(image.copy(), plan);
   const deep::GuideDenoisers denoisers{deep::flatNlMeans(deep::planFlattened(plan)), reference::boxDenoiser(),
                                        deep::kOwnGuide};
-  const deep::BaseGuide guide = deep::makeGuide(deep::guideInput(image, plan.inputs, true), denoisers, plan.level);
+  const deep::BaseGuide guide = deep::makeGuide(deep::guideInput(image, plan, true), denoisers, plan);
   return deep::denoise(image.copy(), plan, {}, nullptr, &guide);
 }
 
