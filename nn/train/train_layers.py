@@ -4,8 +4,8 @@
     train_layers.py --data FOLDER... --out FOLDER [--width 32] [--steps 20000] ...
 
 As train.py, on files of samples, X.samples.exr or X.<spp>.samples.exr, and their references. The scenes fur, coffee and living-room, and the
-shared frame staircase2, are never trained on; --share holds back some of the others. With --start, weights or a checkpoint of a compositional
-denoiser of the same width, it begins with the U-net of that one's filter.
+shared frame staircase2, are never trained on; --share holds back some of the others. With --start, weights or a checkpoint of the same width,
+it begins with those of a layered denoiser, or with the U-net of a compositional one's filter.
 
 Each step draws L from {1, 2, 4}. Batches are of the same size for all, since the layers are a small part of the work.
 """
@@ -19,7 +19,7 @@ import train
 from layers_augment import Batches
 from layers_loss import loss
 from layers_model import LAYERS, Layered, gigaflops_per_megapixel
-from weights import load_model
+from weights import kind_of, load_model
 
 SHARES = {1: 0.25, 2: 0.45, 4: 0.3}  # of the steps
 LOGGED = (*(("samples", k) for k in LAYERS), ("pixels", 1))  # form and layers
@@ -30,14 +30,21 @@ class Training(train.Training):
 
     def first_model(self):
         settings = self.settings
+        if settings.start and kind_of(settings.start) is Layered:
+            model = load_model(settings.start, Layered).train()
+            self.expect_width(model.width)
+            return model
         model = Layered(settings.width)
         if settings.start:
             begun = load_model(settings.start).denoise
-            if begun.kernel0.in_channels != settings.width:
-                raise SystemExit(f"train_layers.py: {settings.start}: expected width {settings.width}, found {begun.kernel0.in_channels}")
+            self.expect_width(begun.kernel0.in_channels)
             known, taken = model.unet.state_dict(), begun.state_dict()
             model.unet.load_state_dict({name: x if name.startswith("in.") else taken[name] for name, x in known.items()})
         return model
+
+    def expect_width(self, found):
+        if found != self.settings.width:
+            raise SystemExit(f"train_layers.py: {self.settings.start}: expected width {self.settings.width}, found {found}")
 
     def frames_and_batches(self):
         settings = self.settings

@@ -57,6 +57,12 @@ def save_model(path, network, metadata):
     write_tensors(path, state, {**fixed, **metadata})
 
 
+def kind_of(path):
+    """Which of FORMATS a weight file or a checkpoint is of."""
+    names = torch.load(path, map_location="cpu")["average"] if str(path).endswith(".pt") else read_tensors(path)[0]
+    return layers_model.Layered if "partition.context.weight" in names else model.Compositional
+
+
 def load_model(path, kind=model.Compositional):
     """The model of a weight file or of a checkpoint, ready to denoise."""
     if str(path).endswith(".pt"):

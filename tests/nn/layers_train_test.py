@@ -25,6 +25,7 @@ import layers_augment
 import layers_crops
 import layers_loss
 import samples
+import train
 import train_layers
 from layers_model import Layered, Result, Samples
 from weights import load_model
@@ -205,6 +206,10 @@ class Data(unittest.TestCase):
         export_layers.main([str(self.folder / "whole"), str(self.folder / "layers.safetensors")])
         exported = load_model(self.folder / "layers.safetensors", Layered).state_dict()
         self.assertTrue(all(torch.equal(x, whole["average"][k]) for k, x in exported.items()))
+        for start in ("layers.safetensors", "whole/checkpoint.pt"):
+            flags = ["--data", self.folder / "frames", "--out", self.folder / "further", "--width", 8, "--crop", 32, "--start", self.folder / start]
+            begun = train_layers.Training(train.options([str(x) for x in flags])).model.state_dict()
+            self.assertTrue(all(torch.equal(x, begun[k]) for k, x in exported.items()))
         self.assertIn("fur/view0", (self.folder / "layers.md").read_text())
         evaluate_layers.main([str(self.folder / "layers.safetensors"), str(self.folder / "frames"), "--out", str(self.folder / "pictures")])
         self.assertEqual(len(list((self.folder / "pictures").glob("*.png"))), 3)
