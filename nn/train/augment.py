@@ -62,12 +62,17 @@ def streaks(random, height, width):
     return (result - result.mean()) / max(float(result.std()), 1e-6)
 
 
+def half_plane(random, height, width):
+    """One side of a line through the middle, (height, width)."""
+    across = random.standard_normal(2) @ np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j].reshape(2, -1)
+    return across.reshape(height, width) > 0
+
+
 def drawn_pattern(random, height, width):
     """A factor on light of a mean near 1, (height, width), its relief and contrast."""
     relief = streaks(random, height, width)
     if random.random() < 0.5:  # in a part of the crop only
-        edge = random.standard_normal(2) @ np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j].reshape(2, -1)
-        relief = relief * (edge.reshape(relief.shape) > 0)
+        relief = relief * half_plane(random, height, width)
     contrast = random.uniform(*CONTRAST)
     return np.exp(contrast * relief - 0.5 * contrast**2 * (relief != 0)).astype(np.float32), relief, contrast
 

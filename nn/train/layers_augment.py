@@ -1,9 +1,9 @@
-"""Variations of a crop of camera samples: how many of them, and in which form; exposure, flips, colours, patterns, missing features."""
+"""Variations of a crop of camera samples: how many of them, and in which form; exposure, flips, colours, patterns, lit backdrops, missing features."""
 
 import numpy as np
 
 import augment
-from augment import FAINT, PATTERNED, SHARES, STOPS, drawn_pattern
+from augment import FAINT, PATTERNED, SHARES, STOPS, drawn_pattern, half_plane
 from clusters import PHYSICAL, chosen, gathered, labels
 from layers_model import assembled
 from planes import LIGHTS
@@ -17,6 +17,10 @@ EXPONENTS, FIRSTS = (1.0, 1.5, 2.0, 3.0), (0, 1)  # of the clustering
 # How often a feature is taken away. Bins seldom know where on the lens their samples were.
 MISSING = {("albedo",): 0.1, ("normal",): 0.1, ("coc",): 0.25, ("lens",): 0.25, ("components",): 0.15, ("noise",): 0.2}
 BARE = 0.05  # share of crops with light and depth alone
+
+# Lamps and windows are even, bright and seldom seen, and their edges blurred by a lens were taken for noise. So in some of the crops with something
+# empty that is filled with light, in stops from the frame's mean; in half of these a part of it only, and this far behind what is farthest.
+LIT, LIGHT_STOPS, BEHIND = 0.5, (-2.0, 4.5), (1.02, 4.0)
 
 
 def formed(random, form, samples, spp, scale):
@@ -85,6 +89,29 @@ def turned(random, samples, targets):
     return samples, targets
 
 
+def with_backdrop(random, samples, targets, exposure):
+    """The crop with an even light where camera samples hit nothing, in place. Its surface has no albedo and faces nowhere."""
+    height, width = targets.shape[:2]
+    there = samples[..., WHERE["depth"].start] > 0
+    empty = 1 - targets[..., -2]
+    if targets[..., -1].min() < 1 or there.all() or not there.any() or not empty.max() > 0.01:  # or what is behind is seen, and not known
+        return
+    lit = half_plane(random, height, width) if random.random() < 0.5 else np.ones((height, width), bool)
+    light = 2.0 ** random.uniform(*LIGHT_STOPS) * random.uniform(0.5, 1, 3) / exposure
+    farthest = samples[there][np.argmax(samples[there][:, WHERE["depth"].start])]
+    added = np.zeros(samples.shape[-1], np.float32)
+    added[WHERE["specular"]] = light
+    added[WHERE["depth"]] = farthest[WHERE["depth"]] * random.uniform(*BEHIND)
+    added[WHERE["coc"]] = farthest[WHERE["coc"]]
+    filled = ~there & lit[..., None]
+    samples[filled] = added
+    samples[..., WHERE["lens"]][filled] = random.random((int(filled.sum()), 2))
+    for k, name in enumerate(LIGHTS):
+        if name != "diffuse":
+            targets[..., 3 * k : 3 * k + 3] += (lit * empty)[..., None] * light
+    targets[..., -2][lit] = 1
+
+
 def with_one_light(random, samples, targets):
     """The crop with its diffuse or its specular light alone, or with both; targets (height, width, 5): of that light, alpha, counts; and its name."""
     means = dict(zip(LIGHTS, targets[..., : 3 * len(LIGHTS)].reshape(-1, len(LIGHTS), 3).mean((0, 2))))
@@ -100,7 +127,10 @@ def with_one_light(random, samples, targets):
 
 def varied(random, frame, samples, targets):
     """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 5), light times the exposure."""
-    samples, targets, light = with_one_light(random, *turned(random, samples, targets))
+    samples, targets = turned(random, samples, targets)
+    if random.random() < LIT:
+        with_backdrop(random, samples, targets, frame.exposure)
+    samples, targets, light = with_one_light(random, samples, targets)
     if random.random() < PATTERNED:
         pattern = drawn_pattern(random, *targets.shape[:2])[0][:, :, None]
         samples[..., :6] *= pattern[..., None]

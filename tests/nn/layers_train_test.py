@@ -28,6 +28,7 @@ import samples
 import train
 import train_layers
 from layers_model import Layered, Result, Samples
+from planes import LIGHTS
 from weights import load_model
 
 torch.set_num_threads(1)
@@ -172,6 +173,33 @@ class Data(unittest.TestCase):
             lights.add((bool(values[:, :3].any()), bool(values[:, 3:6].any())))
         self.assertGreater(len(kinds), 4)
         self.assertEqual(lights, {(True, True), (True, False), (False, True)})
+
+    def test_a_backdrop_lights_what_was_empty(self):
+        pixels, targets = (np.array(x) for x in self.cache().frames[0].crop(3, 5, 32))
+        pixels[10:13, :, 1:] = 0  # all but the nearest missed in a strip
+        there = pixels[..., samples.WHERE["depth"].start] > 0
+        targets[..., -2], targets[..., -1] = there.mean(2), 1
+        before, aims = pixels.copy(), targets.copy()
+        shares = set()
+        for seed in range(12):
+            pixels[:], targets[:] = before, aims
+            layers_augment.with_backdrop(np.random.default_rng(seed), pixels, targets, 2.0)
+            added = (pixels[..., samples.WHERE["depth"].start] > 0) & ~there
+            shares.add(round(added.sum() / (~there).sum(), 2))
+            np.testing.assert_array_equal(pixels[there], before[there])
+            self.assertGreater(pixels[added][:, samples.WHERE["depth"]].min(), before[..., samples.WHERE["depth"]].max())
+            light = pixels[added][0, samples.WHERE["specular"]]
+            self.assertTrue(0.25 * 0.5 / 2 <= light.min() and light.max() <= 2**4.5 / 2)
+            more = added.mean(2)[..., None] * light
+            for k, name in enumerate(LIGHTS):
+                np.testing.assert_allclose(targets[..., 3 * k : 3 * k + 3] - aims[..., 3 * k : 3 * k + 3], more * (name != "diffuse"), rtol=1e-4, atol=1e-5)
+            np.testing.assert_allclose(targets[..., -2], (there | added).mean(2), rtol=1e-5)
+        self.assertIn(1, shares)
+        self.assertGreater(len(shares), 2)
+        pixels[:], targets[:] = before, aims
+        targets[0, 0, -1] = 0  # an environment is seen
+        layers_augment.with_backdrop(np.random.default_rng(1), pixels, targets, 2.0)
+        np.testing.assert_array_equal(pixels, before)
 
     def test_places_on_the_lens_turn_with_the_picture(self):
         lens = np.float32([0.75, 0.9])  # to the right and up
