@@ -18,9 +18,11 @@ EXPONENTS, FIRSTS = (1.0, 1.5, 2.0, 3.0), (0, 1)  # of the clustering
 MISSING = {("albedo",): 0.1, ("normal",): 0.1, ("coc",): 0.25, ("lens",): 0.25, ("components",): 0.15, ("noise",): 0.2}
 BARE = 0.05  # share of crops with light and depth alone
 
-# Lamps and windows are even, bright and seldom seen, and their edges blurred by a lens were taken for noise. So in some of the crops with something
-# empty that is filled with light, in stops from the frame's mean; in half of these a part of it only, and this far behind what is farthest.
-LIT, LIGHT_STOPS, BEHIND = 0.5, (-2.0, 4.5), (1.02, 4.0)
+# Lamps and windows are even, bright and seldom seen, and matte walls around them spread their want of specular light over them. So some crops have a
+# panel of even light, and in some of those with something empty that is filled with light; in stops from the frame's mean. A backdrop fills
+# all or, in half of the cases, a part of what is empty, and is this far behind what is farthest.
+PANELS, LIT, LIGHT_STOPS, BEHIND = 0.25, 0.5, (-2.0, 4.5), (1.02, 4.0)
+PANEL_SIDES = (0.1, 0.8)  # half of a panel's sides over half of the crop's
 
 
 def formed(random, form, samples, spp, scale):
@@ -89,6 +91,24 @@ def turned(random, samples, targets):
     return samples, targets
 
 
+def drawn_light(random, exposure):
+    return 2.0 ** random.uniform(*LIGHT_STOPS) * random.uniform(0.5, 1, 3) / exposure
+
+
+def with_panel(random, samples, targets, exposure):
+    """The crop with a rectangle that gives light and reflects none, in place."""
+    height, width = targets.shape[:2]
+    angle, place = random.uniform(0, np.pi), np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j] - random.uniform(-0.8, 0.8, (2, 1, 1))
+    along, across = (place[0] * np.sin(a) + place[1] * np.cos(a) for a in (angle, angle + np.pi / 2))
+    inside = (np.abs(along) < random.uniform(*PANEL_SIDES)) & (np.abs(across) < random.uniform(*PANEL_SIDES))
+    light = drawn_light(random, exposure)
+    hit = (samples[..., WHERE["depth"].start] > 0) & inside[..., None]
+    for name, value in (("diffuse", 0), ("specular", light), ("albedo", 0)):
+        samples[..., WHERE[name]][hit] = value
+    for k, name in enumerate(LIGHTS):
+        targets[inside, 3 * k : 3 * k + 3] = targets[inside, -2:-1] * (light * (name != "diffuse"))
+
+
 def with_backdrop(random, samples, targets, exposure):
     """The crop with an even light where camera samples hit nothing, in place. Its surface has no albedo and faces nowhere."""
     height, width = targets.shape[:2]
@@ -97,7 +117,7 @@ def with_backdrop(random, samples, targets, exposure):
     if targets[..., -1].min() < 1 or there.all() or not there.any() or not empty.max() > 0.01:  # or what is behind is seen, and not known
         return
     lit = half_plane(random, height, width) if random.random() < 0.5 else np.ones((height, width), bool)
-    light = 2.0 ** random.uniform(*LIGHT_STOPS) * random.uniform(0.5, 1, 3) / exposure
+    light = drawn_light(random, exposure)
     farthest = samples[there][np.argmax(samples[there][:, WHERE["depth"].start])]
     added = np.zeros(samples.shape[-1], np.float32)
     added[WHERE["specular"]] = light
@@ -128,6 +148,8 @@ def with_one_light(random, samples, targets):
 def varied(random, frame, samples, targets):
     """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 5), light times the exposure."""
     samples, targets = turned(random, samples, targets)
+    if random.random() < PANELS:
+        with_panel(random, samples, targets, frame.exposure)
     if random.random() < LIT:
         with_backdrop(random, samples, targets, frame.exposure)
     samples, targets, light = with_one_light(random, samples, targets)

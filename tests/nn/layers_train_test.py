@@ -174,6 +174,29 @@ class Data(unittest.TestCase):
         self.assertGreater(len(kinds), 4)
         self.assertEqual(lights, {(True, True), (True, False), (False, True)})
 
+    def test_a_panel_gives_light_and_reflects_none(self):
+        pixels, targets = (np.array(x) for x in self.cache().frames[0].crop(3, 5, 32))
+        there = pixels[..., samples.WHERE["depth"].start] > 0
+        targets[..., -2] = there.mean(2)
+        before, aims = pixels.copy(), targets.copy()
+        shares = []
+        for seed in range(12):
+            pixels[:], targets[:] = before, aims
+            layers_augment.with_panel(np.random.default_rng(seed), pixels, targets, 2.0)
+            inside = (pixels != before).any((2, 3))
+            shares.append(inside.mean())
+            np.testing.assert_array_equal(targets[~inside & there.any(2)], aims[~inside & there.any(2)])
+            hit = there & inside[..., None]
+            self.assertFalse(pixels[hit][:, samples.WHERE["diffuse"]].any() or pixels[hit][:, samples.WHERE["albedo"]].any())
+            light = pixels[hit][0, samples.WHERE["specular"]]
+            np.testing.assert_array_equal(pixels[hit][:, samples.WHERE["specular"]], np.tile(light, (hit.sum(), 1)))
+            np.testing.assert_array_equal(pixels[..., samples.WHERE["depth"]], before[..., samples.WHERE["depth"]])
+            for k, name in enumerate(LIGHTS):
+                expected = targets[inside][:, -2:-1] * light * (name != "diffuse")
+                np.testing.assert_allclose(targets[inside][:, 3 * k : 3 * k + 3], expected, rtol=1e-5)
+        self.assertGreater(max(shares), 0.2)
+        self.assertLess(min(shares), 0.2)
+
     def test_a_backdrop_lights_what_was_empty(self):
         pixels, targets = (np.array(x) for x in self.cache().frames[0].crop(3, 5, 32))
         pixels[10:13, :, 1:] = 0  # all but the nearest missed in a strip
