@@ -133,7 +133,8 @@ def with_backdrop(random, samples, targets, exposure):
 
 
 def with_one_light(random, samples, targets):
-    """The crop with its diffuse or its specular light alone, or with both; targets (height, width, 5): of that light, alpha, counts; and its name."""
+    """The crop with its diffuse or its specular light alone, or with both; targets (height, width, 8): of that light, alpha, counts, and the
+    other light; and its name."""
     means = dict(zip(LIGHTS, targets[..., : 3 * len(LIGHTS)].reshape(-1, len(LIGHTS), 3).mean((0, 2))))
     names = [name for name in LIGHTS if name == "rgb" or means[name] > FAINT * means["rgb"]]
     shares = np.array([SHARES[name] for name in names])
@@ -142,11 +143,15 @@ def with_one_light(random, samples, targets):
         if light not in ("rgb", name):
             samples[..., WHERE[name]] = 0
     first = 3 * LIGHTS.index(light)
-    return samples, np.concatenate([targets[..., first : first + 3], targets[..., -2:]], -1), light
+    chosen, whole = targets[..., first : first + 3], targets[..., :3]
+    return samples, np.concatenate([chosen, targets[..., -2:], np.maximum(whole - chosen, 0)], -1), light
+
+
+LIT_TARGETS = [0, 1, 2, 5, 6, 7]
 
 
 def varied(random, frame, samples, targets):
-    """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 5), light times the exposure."""
+    """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 8), light times the exposure."""
     samples, targets = turned(random, samples, targets)
     if random.random() < PANELS:
         with_panel(random, samples, targets, frame.exposure)
@@ -156,7 +161,7 @@ def varied(random, frame, samples, targets):
     if random.random() < PATTERNED:
         pattern = drawn_pattern(random, *targets.shape[:2])[0][:, :, None]
         samples[..., :6] *= pattern[..., None]
-        targets[..., :3] *= pattern
+        targets[..., LIT_TARGETS] *= pattern
         if random.random() < augment.SHOWN["albedo"]:
             albedo = samples[..., WHERE["albedo"]]
             np.minimum(albedo * pattern[..., None], 1, out=albedo)
@@ -167,14 +172,14 @@ def varied(random, frame, samples, targets):
     apart = light == "diffuse" and "components" not in gone
     values, divisor = divided(values) if apart else (values, np.ones((len(values), 3), np.float32))
     scale = frame.exposure * 2.0 ** random.uniform(-STOPS, STOPS)
-    targets[..., :3] = scale * np.maximum(targets[..., :3], 0)
+    targets[..., LIT_TARGETS] = scale * np.maximum(targets[..., LIT_TARGETS], 0)
     z = values[:, WHERE["depth"]][:, 0]
     return (inputs(values, weight, scale, frame.depth), weight, scale * light_of(values), z / frame.depth, divisor, pixel), targets
 
 
 class Batches(augment.Batches):
     def batch(self, step, count):
-        """Samples of `count` crops, and their targets (count, 5, height, width)."""
+        """Samples of `count` crops, and their targets (count, 8, height, width)."""
         random = np.random.default_rng([self.seed, step])
         parts = [varied(random, *crop) for crop in self.crops(random, count)]
         targets = np.stack([x for _, x in parts]).transpose(0, 3, 1, 2)

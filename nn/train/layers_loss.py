@@ -43,17 +43,17 @@ def undecided(result, samples):
 
 
 def loss(result, samples, targets, settled):
-    """The error at full size, and what is to be minimised; targets (frames, 5, height, width): light, alpha, and whether they count;
+    """The error at full size, and what is to be minimised; targets (frames, 8, height, width): light, alpha, whether they count, and other light of the pixel;
     settled: from 0 to 1, how far the training is with that."""
-    light, alpha, counts = targets[:, :3], targets[:, 3:4], targets[:, 4:5] > 0
+    light, alpha, counts, other = targets[:, :3], targets[:, 3:4], targets[:, 4:5] > 0, targets[:, 5:]
     colour = torch.where(counts, result.colour, light)
-    error = smape(colour, light)
-    total = error + SQUARED * relative_square(colour, light) + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
+    error = smape(colour, light, other)
+    total = error + SQUARED * relative_square(colour, light, other) + LOGITS * mean_squares(result.logits) + FEATURES * mean_squares(result.features)
     total = total + ALPHA * ((result.alpha - alpha) ** 2).mean()
     whole = counts.float()
     for coarse, weight in zip(result.coarse, COARSE):
-        light, whole = half_size(light), half_size(whole)
-        total = total + weight * smape(torch.where(whole > 0.99, coarse, light), light)
+        light, whole, other = half_size(light), half_size(whole), half_size(other)
+        total = total + weight * smape(torch.where(whole > 0.99, coarse, light), light, other)
     if result.partition.shape[1] > 1:
         first, last = APART
         total = total + (first + (last - first) * settled) * order(result, samples) + UNDECIDED * undecided(result, samples)

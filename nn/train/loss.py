@@ -17,13 +17,14 @@ SQUARED, DARK, LARGEST = 0.5, 0.05, 4.0
 UNIFORM = 10.0  # weight of the variance of the masks early in training (supplement, section 2.2)
 
 
-def smape(result, reference):
-    """Equation 1: the symmetric mean absolute percentage error, of colours times the exposure."""
-    return ((reference - result).abs() / (reference.abs() + result.abs() + EPSILON)).mean()
+def smape(result, reference, other=0):
+    """Equation 1: the symmetric mean absolute percentage error, of colours times the exposure; where these are a part of the light, of the
+    whole with the `other` part as it should be. (Of the part alone, light beside what has none would cost as much as all light missing.)"""
+    return ((reference - result).abs() / (reference.abs() + result.abs() + 2 * other + EPSILON)).mean()
 
 
-def relative_square(result, reference):
-    return ((result - reference) ** 2 / (reference**2 + DARK)).clamp(max=LARGEST).mean()
+def relative_square(result, reference, other=0):
+    return ((result - reference) ** 2 / ((reference + other) ** 2 + DARK)).clamp(max=LARGEST).mean()
 
 
 def mask_variance(masks):

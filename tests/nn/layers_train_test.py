@@ -24,6 +24,7 @@ import frames
 import layers_augment
 import layers_crops
 import layers_loss
+import loss
 import samples
 import train
 import train_layers
@@ -267,6 +268,12 @@ class Data(unittest.TestCase):
 
 
 class Loss(unittest.TestCase):
+    def test_a_part_of_the_light_errs_as_the_whole_does(self):
+        part, reference, other = torch.rand(3, 2, 3, 8, 8, generator=torch.Generator().manual_seed(1))
+        for error in (loss.smape, loss.relative_square):
+            self.assertAlmostEqual(error(part, reference, other).item(), error(part + other, reference + other).item(), places=5)
+            self.assertLess(error(part, reference, other).item(), error(part, reference).item())
+
     def result(self, places, depth, pixel):
         partition = torch.nn.functional.one_hot(torch.tensor(places), 2).float()
         listed = Samples(None, torch.ones(len(places)), None, torch.tensor(depth), None, torch.tensor(pixel), (1, 4, 16))
