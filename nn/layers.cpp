@@ -79,8 +79,8 @@ double LayersNet::flopPerPixel(double samples, int layers, int lights) const {
   double pixel = context_->graph().flopPerPixel();
   for (int i = 0; i < kLayerScales; ++i)
     pixel += layers * (kernel_[i]->graph().flopPerPixel() + 2.0 * kKernelTaps * kSplatted) / (1 << 2 * i);
-  const double divisor = lights > 1 ? 2.0 * kKernelTaps * kDivisors * layers * (1 + 1 / 4.0 + 1 / 16.0) : 0;
-  return samples * (embed + second) + lights * pixel + divisor;
+  const double division = lights > 1 ? 2.0 * kKernelTaps * kDivision * layers * (1 + 1 / 4.0 + 1 / 16.0) : 0;
+  return samples * (embed + second) + lights * pixel + division;
 }
 
 double LayersNet::bandBytes(int layers, int lights) const {
@@ -95,7 +95,7 @@ double LayersNet::tileBytes() const {
   double filter = 0;
   for (int i = 0; i < kLayerScales; ++i) {
     filter = std::max(filter, double(arenaOf(*kernel_[i], kSide >> i)));
-    filter += double(kSide >> i) * (kSide >> i) * (2 * kEmbedding + kSplatted + 2 * kLayerPlanes + 3 * kDivisors) *
+    filter += double(kSide >> i) * (kSide >> i) * (2 * kEmbedding + kSplatted + 2 * kLayerPlanes + 3 * kDivision) *
               sizeof(float);
   }
   const double input = double(kSide) * kSide * kEmbedding * double(bytesOf(element()) + sizeof(float));

@@ -6,7 +6,8 @@
 // maximum, which would tie tiles together; a hundredth is taken off each share, so that layers can be exactly empty; what
 // misses everything (alpha below 1) passes all layers; scales are joined in each layer, before compositing, so that layers
 // exist at full size; diffuse and specular light are filtered apart, as pixel networks do, the diffuse one divided by the
-// albedo of its sample, and what a layer becomes is multiplied by the albedo of the pixel's own samples in that layer.
+// albedo of its sample, and what a layer becomes is multiplied by the albedo of the pixel's own samples in that layer, as
+// far as the light was not brighter before it was divided.
 // Graphs and the other departures: nn/layers_graphs.h.
 #pragma once
 

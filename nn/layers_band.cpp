@@ -141,8 +141,11 @@ void LayersBand::addChunk(Light& light, int y, const SampleRow& row, const Sampl
       for (size_t c = 0; c < 3; ++c) to[c * plane] += w * row.exposed(light.light, c, s);
       to[3 * plane] += w;
       to[5 * plane] += w * row.plane(kSampleDepth)[s];
-      for (size_t c = 0; light.divided() && c < kDivisors; ++c)
-        to[(kSplatted + c) * plane] += w * (row.plane(kAlbedoInput + c)[s] + kLeastAlbedo);
+      for (size_t c = 0; light.divided() && c < 3; ++c) {
+        const float by = w * (row.plane(kAlbedoInput + c)[s] + kLeastAlbedo);
+        to[(kSplatted + c) * plane] += by;
+        to[(kSplatted + 3 + c) * plane] += by * row.exposed(light.light, c, s);
+      }
     }
     addWeighted(chunk.embedding, chunk.groupFloats, int(groups()), net_.block(), weight.data(), pixels.data(),
                 chunk.count, light.sums[size_t(l)].embedding.data(), pixelFloats() * plane);

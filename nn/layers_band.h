@@ -54,8 +54,8 @@ class LayersBand {
     std::vector<Sums> sums;                  // of each layer
 
     bool divided() const { return light == SampleLight::Diffuse; }
-    size_t splatted() const { return kSplatted + (divided() ? kDivisors : 0); }
-    size_t made() const { return kLayerPlanes + (divided() ? kDivisors : 0); }
+    size_t splatted() const { return kSplatted + (divided() ? kDivision : 0); }
+    size_t made() const { return kLayerPlanes + (divided() ? kDivision : 0); }
   };
 
   class TileFilter;

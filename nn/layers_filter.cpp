@@ -106,15 +106,20 @@ class LayersBand::TileFilter {
     enlarge(joined_, shares_.row(2, 0), shares_.stride(), half_);
   }
 
-  // By the divisor of a pixel's own samples in the layer, and, beside them, what the kernels make of it.
+  // By the divisor of a pixel's own samples in the layer, and, beside them, what the kernels make of it. Where bright light
+  // comes of little albedo, as through leaves and curtains, the mean of quotients times that of divisors is too much: what
+  // the kernels make of the light before, over what they make of divisors, is the most.
   void multiply() {
     for (int y = tile_.y - from_.y; y < tile_.y - from_.y + tile_.height; ++y) {
       const float *weight = values_[0].row(3, y), *alpha = joined_.row(3, y);
-      for (size_t c = 0; c < kDivisors; ++c) {
-        const float *own = values_[0].row(kSplatted + c, y), *around = joined_.row(kLayerPlanes + c, y);
+      for (size_t c = 0; c < 3; ++c) {
+        const float *own = values_[0].row(kSplatted + c, y), *divisor = joined_.row(kLayerPlanes + c, y),
+                    *before = joined_.row(kLayerPlanes + 3 + c, y);
         float* light = joined_.row(c, y);
-        for (int x = tile_.x - from_.x; x < tile_.x - from_.x + tile_.width; ++x)
-          light[x] *= (own[x] + kAround * around[x] / std::max(alpha[x], kTiny)) / (weight[x] + kAround);
+        for (int x = tile_.x - from_.x; x < tile_.x - from_.x + tile_.width; ++x) {
+          const float around = std::max(divisor[x] / std::max(alpha[x], kTiny), kLeastAlbedo);
+          light[x] = std::min(light[x], before[x] / around) * (own[x] + kAround * around) / (weight[x] + kAround);
+        }
       }
     }
   }

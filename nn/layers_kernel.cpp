@@ -113,7 +113,7 @@ HWY_INLINE void SplatPlanes(const float* const* weights, size_t stride, const fl
   const D d;
   const V tiny = hn::Set(d, 1e-12f), one = hn::Set(d, 1.0f), zero = hn::Zero(d);
   for (size_t x = 0; x < width; x += hn::Lanes(d)) {
-    V sum[kMostSplatted] = {zero, zero, zero, zero, zero, zero, zero, zero, zero};
+    V sum[kMostSplatted] = {zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
     for (size_t i = 0; i < kKernelWidth; ++i)
       for (size_t j = 0; j < kKernelWidth; ++j) {
         const ptrdiff_t from = ptrdiff_t(x) + kKernelWidth / 2 - ptrdiff_t(j);

@@ -15,8 +15,9 @@ namespace fathom::nn {
 // What a layer's kernels splat, and what comes out of them.
 constexpr size_t kSplatted = 6;     // R, G, B, weight, occupancy, depth, each times the weight but for the occupancy
 constexpr size_t kLayerPlanes = 5;  // R, G, B (premultiplied), alpha, depth times alpha
-constexpr size_t kDivisors = 3;     // behind both, where light is divided: R, G, B of what by, times weight or alpha
-constexpr size_t kMostSplatted = kSplatted + kDivisors;
+// Behind both where light is divided, times weight or alpha: R, G, B of what by, and of the light before.
+constexpr size_t kDivision = 6;
+constexpr size_t kMostSplatted = kSplatted + kDivision;
 
 // Planes whose rows have zeros on both sides, and room for whole vectors on the right. Keeps its memory.
 class WidePlanes {
@@ -55,8 +56,8 @@ void halveGroups(const float* from, int groups, int height, int width, int block
 
 // Splats `values` (kSplatted planes with clear borders, kMostSplatted if `divided`) with kernels exp(clamp(logit, -12,
 // 12)) of 5x5 taps, row-major from (-2, -2): what pixel q gives to q + d is weighed by tap d of q. Pixels beyond the
-// borders do not exist. `result` gets kLayerPlanes planes (and kDivisors): sums of colours, weights, depths (and divisors)
-// over those of occupancies; alpha at most 1. `logits`: [groups][height][width][block]; for `shares` that are given, three
+// borders do not exist. `result` gets kLayerPlanes planes (and kDivision): sums of colours, weights, depths (and the
+// others) over those of occupancies; alpha at most 1. `logits`: [groups][height][width][block]; for `shares` that are given, three
 // more channels, whose softmax becomes its planes.
 void splat(const float* logits, int block, const WidePlanes& values, bool divided, WidePlanes& result,
            WidePlanes* shares);

@@ -8,7 +8,7 @@ what misses everything passes all layers; partitions below FLOOR are none, so th
 Samples are a ragged list: `pixel` says for each of S samples in which of frames * height * width pixels it lies. Sides are multiples of
 4. A layer's kernels depend on the layer by its embeddings alone: the same weights serve 1, 2 and 4 layers. Diffuse and specular light are filtered
 apart, with their own kernels, in the layers that the samples were put in with the diffuse light (`together`). Diffuse light is divided by the
-albedo of its sample, and what a layer becomes is multiplied by the albedo of the pixel's own samples in that layer (`albedo_of`).
+albedo of its sample, and what a layer becomes is multiplied by the albedo of the pixel's own samples in that layer (`multiplied`).
 
 The names of the layers are the interface to the C++ side: `state_dict()` and the weight file have the same names.
 """
@@ -21,6 +21,7 @@ from torch import nn
 from torch.nn import functional
 
 from model import RADIUS, TAPS, Gather, UNet, convolution, half_size, upsampled
+from samples import LEAST_ALBEDO
 
 INPUTS = 20
 EMBEDDING = 32
@@ -120,10 +121,12 @@ class Sharpened(torch.autograd.Function):
         return gradient.clamp(-STEEPEST, STEEPEST)
 
 
-def albedo_of(filtered, own):
-    """What light is to be multiplied by: the divisor of the pixel's own samples, and of those around it where it has few."""
-    around = (filtered[:, 5:] / filtered[:, 3:4].clamp(min=TINY)).detach()
-    return (own[:, 2:] + OWN * around) / (own[:, :1] + OWN)
+def multiplied(filtered, own):
+    """Light times the divisor of the pixel's own samples, and of those around it where it has few. Where bright light comes of little albedo,
+    as through leaves and curtains, the mean of quotients times that of divisors is too much: what the kernels make of the light before, over
+    what they make of divisors, is the most."""
+    around = (filtered[:, 5:8] / filtered[:, 3:4].clamp(min=TINY)).detach().clamp(min=LEAST_ALBEDO)
+    return torch.minimum(filtered[:, :3], filtered[:, 8:] / around) * (own[:, 2:] + OWN * around) / (own[:, :1] + OWN)
 
 
 def rows_of(image):
@@ -195,15 +198,16 @@ class Layered(nn.Module):
         scales = self.unet.scales(summed(weight * embedding))
         if partition is None:
             partition = self.shares(rows_of(scales[0]), embedding, samples.pixel, layers)
-        # Light, weight, depth and divisor, then the embedding: what a sample gives to a layer, for its share.
-        given = torch.cat([samples.light, torch.ones_like(weight), samples.depth[:, None], samples.divisor, embedding], 1)
+        # Light, weight, depth, divisor and light before that, then the embedding: what a sample gives to a layer, for its share.
+        before = samples.light * samples.divisor
+        given = torch.cat([samples.light, torch.ones_like(weight), samples.depth[:, None], samples.divisor, before, embedding], 1)
         sums = [summed(weight * partition[:, k : k + 1] * given) for k in range(layers)]
         missed = (1 - sum(x[:, 3:4] for x in sums)).clamp(min=0)
         behind, values = missed, []
         for x in reversed(sums):
             behind = behind + x[:, 3:4]  # occupancy: 1 less what the layers in front took
-            values.insert(0, torch.cat([x[:, :4], behind, x[:, 4:8]], 1))
-        values, embeddings = torch.cat(values), torch.cat([x[:, 8:] for x in sums])
+            values.insert(0, torch.cat([x[:, :4], behind, x[:, 4:11]], 1))
+        values, embeddings = torch.cat(values), torch.cat([x[:, 11:] for x in sums])
         own = torch.cat([x[:, 3:8] for x in sums])
 
         spread, logits, owned = [], [], []
@@ -225,8 +229,7 @@ class Layered(nn.Module):
     def apart(filtered, own, layers):
         """Radiance, opacity and depth, (layers, frames, ...), of what has the layers behind one another; own: weight, depth and divisor of
         the pixels' samples."""
-        radiance = filtered[:, :3] * albedo_of(filtered, own)
-        x = torch.cat([radiance, filtered[:, 3:5]], 1).reshape(layers, -1, 5, *filtered.shape[2:])
+        x = torch.cat([multiplied(filtered, own), filtered[:, 3:5]], 1).reshape(layers, -1, 5, *filtered.shape[2:])
         return x[:, :, :3], x[:, :, 3:4], x[:, :, 4:5]
 
 

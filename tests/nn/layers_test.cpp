@@ -338,9 +338,9 @@ TEST(LayersNet, CountsItsArithmetic) {
   EXPECT_DOUBLE_EQ(net.flopPerPixel(0, 1), 2 * (unet + context + layer));
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 1), 2 * (8 * 2 * reducer + unet + context + layer));
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4), 2 * (8 * (2 * reducer + partition) + unet + context + 4 * layer));
-  const double divisor = 25 * 3 * (1 + 1 / 4.0 + 1 / 16.0);
+  const double division = 25 * 6 * (1 + 1 / 4.0 + 1 / 16.0);
   EXPECT_DOUBLE_EQ(net.flopPerPixel(8, 4, 2),
-                   2 * (8 * (4 * reducer + partition) + 2 * (unet + context + 4 * layer) + 4 * divisor));
+                   2 * (8 * (4 * reducer + partition) + 2 * (unet + context + 4 * layer) + 4 * division));
 }
 
 TEST(LayersNet, RefusesOtherFiles) {

@@ -22,6 +22,7 @@ import golden_layers
 import samples
 import weights
 from layers_model import FLOOR, INPUTS, LAYERS, OWN, Layered, Samples, Splat, composited, gigaflops_per_megapixel
+from samples import LEAST_ALBEDO
 
 torch.set_num_threads(1)
 FOLDER = Path(sys.argv.pop()) if len(sys.argv) > 1 and not sys.argv[-1].startswith("-") else Path(".")
@@ -121,10 +122,10 @@ class Network(unittest.TestCase):
         found = alone.result(s, 1)
         kernels = torch.exp(found.logits[0].clamp(-12, 12)).detach().double().numpy()
         frames, height, width = SHAPE
-        given = torch.cat([s.light, s.divisor, torch.ones_like(s.weight)[:, None]], 1)
-        own = np.zeros((frames * height * width, 7))
+        given = torch.cat([s.light, s.divisor, torch.ones_like(s.weight)[:, None], s.light * s.divisor], 1)
+        own = np.zeros((frames * height * width, 10))
         np.add.at(own, s.pixel.numpy(), (s.weight[:, None] * given).double().numpy())
-        own = own.reshape(frames, height, width, 7)
+        own = own.reshape(frames, height, width, 10)
         sums, total = np.zeros_like(own), np.zeros((frames, height, width, 1))
         for f in range(frames):
             for y, x in np.ndindex(height, width):
@@ -133,11 +134,19 @@ class Network(unittest.TestCase):
                     if 0 <= v < height and 0 <= u < width:
                         sums[f, v, u] += kernels[f, tap, y, x] * own[f, y, x]
                         total[f, v, u] += kernels[f, tap, y, x]
-        around = sums[..., 3:6] / sums[..., 6:]
-        albedo = (own[..., 3:6] + OWN * around) / (own[..., 6:] + OWN)
-        expected = torch.from_numpy((sums[..., :3] / total * albedo).transpose(0, 3, 1, 2)).float()
+        around = np.maximum(sums[..., 3:6] / sums[..., 6:7], LEAST_ALBEDO)
+        albedo = (own[..., 3:6] + OWN * around) / (own[..., 6:7] + OWN)
+        light = np.minimum(sums[..., :3], sums[..., 7:] / around) / total
+        expected = torch.from_numpy((light * albedo).transpose(0, 3, 1, 2)).float()
         torch.testing.assert_close(found.colour, expected, rtol=1e-4, atol=1e-5)
         self.assertGreater((result.colour - found.colour).abs().mean().item(), 1e-3)
+
+    def test_light_that_albedo_does_not_explain_is_not_multiplied(self):
+        """Pixels that see as much of a dark leaf with light behind it as of a white wall, everywhere alike."""
+        pixel = torch.arange(PIXELS).repeat_interleave(2)
+        light, divisor = torch.tensor([[10.0], [0.5]]).expand(2, 3), torch.tensor([[0.1], [1.0]]).expand(2, 3)
+        s = Samples(torch.rand(2 * PIXELS, INPUTS), torch.full((2 * PIXELS,), 0.5), light.repeat(PIXELS, 1), torch.ones(2 * PIXELS), divisor.repeat(PIXELS, 1), pixel, SHAPE)
+        torch.testing.assert_close(self.model(s, 1), torch.full((SHAPE[0], 3, *SHAPE[1:]), 0.75), rtol=1e-4, atol=1e-5)
 
     def test_the_order_of_samples_does_not_matter(self):
         order = torch.randperm(len(self.samples.pixel))

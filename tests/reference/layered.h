@@ -72,7 +72,7 @@ class LayeredTwin {
     return samples;
   }
 
-  // divided: by the albedo inputs and 0.1, of which the layers' light gets the mean back.
+  // divided: by the albedo inputs and 0.1, of which the layers' light gets the mean back, but no more than there was before.
   LayeredResult filteredTogether(const PlainSamples& samples, int layers, bool divided,
                                  const std::vector<std::vector<double>>* given) const {
     const int height = samples.height, width = samples.width;
@@ -89,8 +89,8 @@ class LayeredTwin {
     const std::vector<Volume> context = unet(mean);
     const Volume partition = convolve(weights_, "partition.context", context[0]);
     LayeredResult result;
-    std::vector<Volume> sums, embedding;  // R, G, B, w, n, Z, divisors; E
-    for (int l = 0; l < layers; ++l) sums.emplace_back(9, height, width), embedding.emplace_back(32, height, width);
+    std::vector<Volume> sums, embedding;  // R, G, B, w, n, Z, divisors, light before; E
+    for (int l = 0; l < layers; ++l) sums.emplace_back(12, height, width), embedding.emplace_back(32, height, width);
     forPixels(samples, [&](int y, int x, size_t pixel) {
       for (size_t s = 0; s < samples.pixels[pixel].size(); ++s) {
         const PlainSample& sample = samples.pixels[pixel][s];
@@ -104,8 +104,11 @@ class LayeredTwin {
           for (int c = 0; c < 3; ++c) sums[size_t(l)].at(c, y, x) += w * (sample.colour[c] + sample.colour[3 + c]);
           sums[size_t(l)].at(3, y, x) += w;
           sums[size_t(l)].at(5, y, x) += w * sample.depth;
-          for (int c = 0; c < 3; ++c)
-            sums[size_t(l)].at(6 + c, y, x) += w * (divided ? sample.inputs[size_t(6 + c)] + 0.1 : 1);
+          for (int c = 0; c < 3; ++c) {
+            const double by = divided ? sample.inputs[size_t(6 + c)] + 0.1 : 1;
+            sums[size_t(l)].at(6 + c, y, x) += w * by;
+            sums[size_t(l)].at(9 + c, y, x) += w * by * (sample.colour[c] + sample.colour[3 + c]);
+          }
           for (int c = 0; c < 32; ++c) embedding[size_t(l)].at(c, y, x) += w * embeddings[pixel][s][size_t(c)];
         }
         result.shares.push_back(q);
@@ -162,7 +165,7 @@ class LayeredTwin {
   }
 
   Volume filtered(const Volume& sums, const Volume& embedding, const std::vector<Volume>& context) const {
-    Volume values = sums, e = embedding, result(8, sums.height, sums.width), lambda;
+    Volume values = sums, e = embedding, result(11, sums.height, sums.width), lambda;
     for (int i = 0; i < 3; ++i) {
       const std::string name = "kernel" + std::to_string(i);
       const Volume first = relu(
@@ -171,7 +174,7 @@ class LayeredTwin {
       if (i == 0) lambda = scaleShares(logits);
       Volume out = splatted(logits, values);
       for (int k = 0; k < i; ++k) out = enlarge(out);
-      for (int c = 0; c < 8; ++c)
+      for (int c = 0; c < 11; ++c)
         for (int y = 0; y < out.height; ++y)
           for (int x = 0; x < out.width; ++x) result.at(c, y, x) += lambda.at(i, y, x) * out.at(c, y, x);
       values = halve(values);
@@ -180,8 +183,9 @@ class LayeredTwin {
     for (int c = 0; c < 3; ++c)
       for (int y = 0; y < sums.height; ++y)
         for (int x = 0; x < sums.width; ++x) {
-          const double around = result.at(5 + c, y, x) / std::max(result.at(3, y, x), 1e-12);
-          result.at(c, y, x) *= (sums.at(6 + c, y, x) + 0.125 * around) / (sums.at(3, y, x) + 0.125);
+          const double around = std::max(result.at(5 + c, y, x) / std::max(result.at(3, y, x), 1e-12), 0.1);
+          const double light = std::min(result.at(c, y, x), result.at(8 + c, y, x) / around);
+          result.at(c, y, x) = light * (sums.at(6 + c, y, x) + 0.125 * around) / (sums.at(3, y, x) + 0.125);
         }
     result.values.resize(5 * size_t(sums.height) * size_t(sums.width));
     result.channels = 5;
