@@ -21,7 +21,7 @@ constexpr int kRowsOfSample = 64;
 
 // Bytes of a pixel, measured: the flattened frame's planes and what our filter, or a library's copies, take beside them;
 // the pictures of bins; and what is left when the guide is made.
-constexpr size_t kFlattenedBytes = 340, kPicturesBytes = 176, kKeptBytes = 112;
+constexpr size_t kFlattenedBytes = 340, kPicturesBytes = 182, kKeptBytes = 112;
 constexpr double kMostOfMemory = 0.75;  // that `auto` lets a guide of whole frames have
 
 // A file that is denoised already, as a denoiser.

@@ -68,10 +68,10 @@ GuideInput guideInput(const DeepImage& image, const DenoisePlan& plan, bool with
   const DenoiseInputs& inputs = plan.inputs;
   GuideInput result{flattenNoisy(image, inputs), {}, {}, {}};
   if (!withBins) return result;
-  result.bins = binImages(image, inputs, kMostBinImages);
-  result.shares = binShares(image, kMostBinImages);
   if (inputs.halves || inputs.variance)
     result.calm = calmPixels(prepareColours(image, inputs), {}, image, inputs, plan.level);
+  result.bins = binImages(image, inputs, kMostBinImages);
+  result.shares = binShares(image, kMostBinImages);
   return result;
 }
 

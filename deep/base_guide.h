@@ -65,7 +65,8 @@ struct BaseGuide {
 };
 
 // Runs the denoisers, asking for nothing (flat::kAsked) that no pixel with noise in reach of the plan's filter can see.
-// Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws Error where the frame says nothing of its noise, what the denoisers throw, and Cancelled.
+// Pictures of bins that hold less than a fiftieth of the light's weight are not worth a run. Throws Error where the frame
+// says nothing of its noise, what the denoisers throw, and Cancelled.
 BaseGuide makeGuide(GuideInput input, const GuideDenoisers& denoisers, const DenoisePlan& plan,
                     const Progress& progress = {});
 

@@ -175,12 +175,11 @@ Activity findActivity(const DenoiseData& data, std::span<const ComponentGuide> g
   parallelFor(0, data.height, [&](int y) {
     for (size_t pixel = size_t(y) * width; pixel < size_t(y + 1) * width; ++pixel) {
       if (data.offsets[pixel] == data.offsets[pixel + 1]) activity.still[pixel] = 1;
-      const bool blank = isBlank(data, colours, pixel);
       for (size_t c = 0; c < data.components.size(); ++c)
         for (size_t b = size_t(data.offsets[pixel]); b < size_t(data.offsets[pixel + 1]); ++b) {
           const float* v = data.components[c].data.data() + 8 * b;
           const bool lit = v[0] != 0 || v[1] != 0 || v[2] != 0 || v[4] != 0 || v[5] != 0 || v[6] != 0;
-          if (lit || (!blank && isDumb(data, data.components[c], b)))
+          if (lit || (isDumb(data, data.components[c], b) && !isBlank(data, colours, pixel)))
             activity.light[pixel] = uint8_t(activity.light[pixel] | 1u << c);
         }
     }
