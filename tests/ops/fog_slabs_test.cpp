@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace fathom::deep {
@@ -67,7 +68,14 @@ struct Fogs {
   }
 };
 
+// False where an emulator, as valgrind's, computes in double instead.
+bool longDoubleIsLonger() {
+  const volatile long double one = 1, next = one + std::numeric_limits<long double>::epsilon();
+  return next > one;
+}
+
 TEST(FogSlabs, BordersAreOnTheIntegralAndInOrder) {
+  if (!longDoubleIsLonger()) GTEST_SKIP() << "skipped: the integral needs long double";
   Fogs fogs;
   for (int i = 0; i < 10000; ++i) {
     const FogParams params = fogs.next();
