@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/progress.h"
+#include "base/worker.h"
 #include "cli/denoise_chunks.h"
 #include "cli/stopwatch.h"
 #include "deep/flat_nl_means.h"
@@ -31,16 +32,15 @@ class SequenceRun {
         told_(job_.plan.notes) {}
 
   std::vector<FrameReport> run() {
-    const std::launch launch = job_.overlap ? std::launch::async : std::launch::deferred;
-    std::future<std::optional<Chunk>> reading = std::async(launch, [this] { return reader_.next(); });
+    std::future<std::optional<Chunk>> reading = read();
     while (std::optional<Chunk> chunk = reading.get()) {
       if (stop_.stop_requested()) throw Cancelled();
-      reading = std::async(launch, [this] { return reader_.next(); });
+      reading = read();
       if (!process(*chunk)) continue;
       finishWriting();
       if (!reports_[chunk->frame].error.empty()) continue;  // an earlier band could not be written
       writing_ =
-          std::async(launch, [this, work = std::move(*chunk)]() mutable { return writer_.write(std::move(work)); });
+          start(writingThread_, [this, work = std::move(*chunk)]() mutable { return writer_.write(std::move(work)); });
       if (!job_.overlap) finishWriting();
     }
     finishWriting();
@@ -48,6 +48,18 @@ class SequenceRun {
   }
 
  private:
+  // Calls `work` in the thread of a stage, or, where stages do not overlap, when its result is asked for.
+  template <class Work>
+  std::future<std::invoke_result_t<Work&>> start(std::optional<Worker>& stage, Work work) {
+    if (!job_.overlap) return std::async(std::launch::deferred, std::move(work));
+    if (!stage) stage.emplace();
+    return stage->result(std::move(work));
+  }
+
+  std::future<std::optional<Chunk>> read() {
+    return start(readingThread_, [this] { return reader_.next(); });
+  }
+
   // True where the chunk goes on to be written.
   bool process(Chunk& chunk) {
     FrameReport& report = reports_[chunk.frame];
@@ -134,7 +146,8 @@ class SequenceRun {
   ChunkWriter writer_;
   std::vector<FrameReport> reports_;
   std::set<std::string> told_;
-  std::future<Chunk> writing_;  // last: its destructor waits for the writer
+  std::future<Chunk> writing_;
+  std::optional<Worker> readingThread_, writingThread_;  // last: their destructors wait for the stages
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <stop_token>
 
 #include "base/progress.h"
-#include "gui/worker.h"
+#include "base/worker.h"
 
 namespace fathom::gui {
 

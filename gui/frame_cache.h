@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "base/worker.h"
 #include "gui/background.h"
 #include "gui/picture.h"
-#include "gui/worker.h"
 
 namespace fathom::gui {
 

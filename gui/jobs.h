@@ -9,8 +9,8 @@
 #include <stop_token>
 
 #include "base/progress.h"
+#include "base/worker.h"
 #include "gui/background.h"
-#include "gui/worker.h"
 
 namespace fathom::gui {
 

@@ -18,7 +18,6 @@
 #include "base/error.h"
 #include "gui/background.h"
 #include "gui/jobs_bar.h"
-#include "gui/worker.h"
 
 namespace fathom::gui {
 namespace {
@@ -147,28 +146,6 @@ TEST(Background, WhatWasClearedIsNotDelivered) {
   ASSERT_TRUE(waitFor([&] { return !background.busy(); }));
   EXPECT_THAT(delivered, ElementsAre(2));
   EXPECT_EQ(failed.count(), 0);
-}
-
-TEST(Worker, RunsEverythingInOrderBeforeItGoes) {
-  std::vector<int> ran, gone;
-  std::vector<std::thread::id> where;
-  {
-    std::binary_semaphore gate(0);
-    Worker worker;
-    worker.run([&] { gate.acquire(); });
-    for (const int number : {1, 2, 3}) {
-      const std::shared_ptr<void> held(nullptr, [&gone, number](void*) { gone.push_back(number); });
-      worker.run([&ran, &where, number, held] {
-        ran.push_back(number);
-        where.push_back(std::this_thread::get_id());
-      });
-    }
-    EXPECT_TRUE(ran.empty());
-    gate.release();
-  }
-  EXPECT_THAT(ran, ElementsAre(1, 2, 3));
-  EXPECT_THAT(gone, ElementsAre(1, 2, 3));
-  EXPECT_THAT(where, Each(Ne(std::this_thread::get_id())));
 }
 
 TEST(Caller, CallsInOrderInItsOwnThreadAndNothingOnceItIsGone) {
