@@ -99,7 +99,7 @@ ChunkReader::Opening ChunkReader::open() {
 }
 
 void ChunkReader::openLayers(const DenoiseFrame& frame, const std::string& madeBy) {
-  layers_ = std::make_shared<LayersFrame>(*job_.plan.layers, frame.inputs, job_.source);
+  layers_ = std::make_shared<LayersFrame>(*job_.plan.layers, frame.inputs, job_.source, job_.plan.cameraSamples);
   bands_ = layers_->bands();
   const deep::PartInfo& part = layers_->source().part();
   origin_ = std::make_shared<FrameOrigin>(FrameOrigin{.path = frame.inputs.main,

@@ -218,11 +218,12 @@ void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOpt
 }
 
 // A whole frame by the layered network alone.
-AnyImage denoiseLayered(LayersPlan plan, const FrameInputs& inputs, const SourceOptions& options,
+AnyImage denoiseLayered(const SequencePlan& plan, const FrameInputs& inputs, const SourceOptions& options,
                         const Progress& progress) {
-  plan.params.memory = 0;  // one band
-  LayersFrame frame(plan, inputs, options);
-  if (plan.output == LayersOutput::Flat) return frame.flattened(progress);
+  LayersPlan layers = *plan.layers;
+  layers.params.memory = 0;  // one band
+  LayersFrame frame(layers, inputs, options, plan.cameraSamples);
+  if (layers.output == LayersOutput::Flat) return frame.flattened(progress);
   return frame.denoise(frame.bands().front(), progress, nullptr);
 }
 
@@ -330,7 +331,7 @@ AnyImage denoiseFrame(const DenoiseRequest& request, const Sequence& sequence, i
   const FrameInputs inputs = inputsAt(request, sequence.pattern, frame);
   SequencePlan plan = makePlan(request, sequence, options, inputs.main);
   progress.at(0);
-  if (plan.layers) return denoiseLayered(*plan.layers, inputs, options, progress);
+  if (plan.layers) return denoiseLayered(plan, inputs, options, progress);
   FrameSource source = openFrame(inputs, options, plan);
   std::set<std::string> notes;
   deep::DeepImage image =

@@ -60,8 +60,12 @@ class FrameLook {
   bool volumes_ = false;
 };
 
-// The frame in bands of rows that take at most `bytes` where more than one row does.
+// The frame in bands of rows that take at most `bytes` where more than one row does. The source is left with the
+// channels that this needs.
 FrameLook lookAt(FrameSource& source, size_t bytes, std::set<std::string>& notes) {
+  source.want([](const std::string& name) {
+    return name == "R" || name == "G" || name == "B" || name == "A" || name == "Z" || name == "ZBack";
+  });
   const Box window = source.part().dataWindow;
   FrameLook look;
   for (int y = window.y0; y < window.y1;) {
@@ -84,6 +88,19 @@ void findInputs(SequencePlan& plan, FrameSource& source) {
   plan.denoise.inputs = deep::findDenoiseInputs(names, row.attributes);
   for (const std::string& line : deep::describeMissing(plan.denoise.inputs))
     plan.notes.insert(fmt::format("{}: {}", source.path(), line));
+}
+
+std::string clusteredNote(const FrameInputs& inputs) {
+  return fmt::format("{}: one deep sample per camera sample: clustered into bins first", inputs.main);
+}
+
+// Whether a deep frame holds camera samples that can be clustered: what is missing for that is no error here.
+bool canBeClustered(const FrameInputs& inputs, const SourceOptions& options) {
+  FrameSource source(inputs, options);
+  if (!source.deep() || source.hasStatistics() || !source.tellsDepthScale()) return false;
+  SequencePlan unused;
+  findInputs(unused, source);
+  return lookAt(source, decodedLimit(options.memory), unused.notes).holdsCameraSamples();
 }
 
 enum class Statistics { None, OfOwnFilter, All };
@@ -121,14 +138,11 @@ SequencePlan planFrom(const FrameInputs& inputs, const SourceOptions& options, c
     look.tell(plan);
     return plan;
   }
-  source.want([](const std::string& name) {
-    return name == "R" || name == "G" || name == "B" || name == "A" || name == "Z" || name == "ZBack";
-  });
   const FrameLook look = lookAt(source, decodedLimit(options.memory), plan.notes);
   look.tell(plan);
   plan.cameraSamples = plan.deep && !source.hasStatistics() && look.holdsCameraSamples();
   if (plan.cameraSamples) {
-    plan.notes = {fmt::format("{}: one deep sample per camera sample: clustered into bins first", inputs.main)};
+    plan.notes = {clusteredNote(inputs)};
     source.want({});
     source.clusterFirst();
     findInputs(plan, source);
@@ -233,7 +247,9 @@ SequencePlan planLayered(const std::vector<FrameInputs>& candidates, const Sourc
     SequencePlan plan;
     plan.first = inputs.main;
     plan.layers = layers;
-    plan.notes = LayersFrame(layers, inputs, options).notes();
+    plan.cameraSamples = layers.output != LayersOutput::LayerBins && canBeClustered(inputs, options);
+    plan.notes = LayersFrame(layers, inputs, options, plan.cameraSamples).notes();
+    if (plan.cameraSamples) plan.notes.insert(clusteredNote(inputs));
     return plan;
   });
 }
@@ -276,7 +292,7 @@ deep::DeepImage denoiseAsPlanned(deep::DeepImage image, const FrameInputs& input
 }
 
 std::string describePlan(const SequencePlan& plan) {
-  if (plan.layers) return plan.layers->settings;
+  if (plan.layers) return fmt::format("{} cluster {}", plan.layers->settings, plan.cameraSamples);
   return fmt::format("{} cluster {} {} guide {} errors {}", describeFilter(plan.denoise), plan.cameraSamples,
                      plan.base ? plan.base->settings : "", plan.guide ? plan.guide->settings : "none", plan.errors);
 }

@@ -38,7 +38,9 @@ struct SequencePlan {
 SequencePlan planSequence(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
                           const deep::DenoiseParams& params, const std::string& wanted);
 
-// For a plan that the layered network alone carries out: from the first of the candidates that can be opened.
+// For a plan that the layered network alone carries out: from the first of the candidates that can be opened. Camera
+// samples are clustered first where the file tells how (the network errs less on bins), unless it is they that are
+// coloured.
 SequencePlan planLayered(const std::vector<FrameInputs>& candidates, const SourceOptions& options,
                          const LayersPlan& layers);
 

@@ -208,6 +208,15 @@ void FrameSource::want(std::function<bool(const std::string&)> wanted) {
   main_->want(std::move(wanted));
 }
 
+bool FrameSource::tellsDepthScale() const {
+  try {
+    deep::findPpuScale(part().attributes, part().displayWindow);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 void FrameSource::clusterFirst() {
   try {
     ppuScale_ = deep::findPpuScale(part().attributes, part().displayWindow);

@@ -56,7 +56,10 @@ class FrameSource {
 
   // From now on, only channels of the main file with these names are read.
   void want(std::function<bool(const std::string&)> wanted);
-  // The main file holds one sample per camera sample: they become bins, as `fathom cluster` makes them.
+  // Whether the main file says how large things are in pixels, which clustering goes by.
+  bool tellsDepthScale() const;
+  // The main file holds one sample per camera sample: they become bins, as `fathom cluster` makes them. Throws Error
+  // where it does not tell the scale.
   void clusterFirst();
 
   // Bytes that rows [y0, y1) take when they are decoded, all files together.

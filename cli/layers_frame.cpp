@@ -70,11 +70,9 @@ LayersFrame::LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, cons
     : plan_(plan), source_(inputs, options), layers_(prepare(source_, clustered, notes_, attributes_)) {
   const deep::LayerInputs has = layers_.inputs;
   const bool all = plan.output == LayersOutput::LayerBins;
-  if (!clustered)
-    source_.want([has, all](const std::string& name) {
-      return deep::layersRead(has, name) ||
-             (all && !deep::describesSamples(deep::roleOf(name, deep::PixelType::Float)));
-    });
+  source_.want([has, all](const std::string& name) {
+    return deep::layersRead(has, name) || (all && !deep::describesSamples(deep::roleOf(name, deep::PixelType::Float)));
+  });
   scale_ = deep::measureLayers(layers_, plan_.params);
 }
 

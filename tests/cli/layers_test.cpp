@@ -141,6 +141,27 @@ TEST_F(LayersDenoise, CameraSamplesBecomeBins) {
   expectFine(outcome);
   EXPECT_THAT(outcome.err, HasSubstr("clustered into bins first"));
   EXPECT_LT(read("bins.exr").samples(), read("raw.exr").samples() / 2);
+  expectFine(fathom("cluster raw.exr -o clustered.exr"));
+  const Ran layers = run("raw.exr -o layers.exr --as layers");
+  expectFine(layers);
+  EXPECT_THAT(layers.err, HasSubstr("clustered into bins first"));
+  expectFine(run("clustered.exr -o expected.exr --as layers"));
+  EXPECT_TRUE(std::ranges::equal(read("layers.exr").get("R"), read("expected.exr").get("R")));
+}
+
+TEST_F(LayersDenoise, CameraSamplesStayWhereTheyAreToBeColouredOrNothingTellsTheScale) {
+  const Ran bins = run("raw.exr -o bins.exr --as layer-bins");
+  expectFine(bins);
+  EXPECT_THAT(bins.err, Not(HasSubstr("clustered")));
+  EXPECT_EQ(read("bins.exr").samples(), read("raw.exr").samples());
+  deep::DeepImage image = read("raw.exr");
+  image.attributes.erase("fathom:ppuScale");
+  deep::write(folder_ / "plain.exr", image);
+  const Ran plain = run("plain.exr -o plain-layers.exr --as layers");
+  expectFine(plain);
+  EXPECT_THAT(plain.err, Not(HasSubstr("clustered")));
+  expectFine(run("raw.exr -o layers.exr --as layers"));
+  EXPECT_FALSE(std::ranges::equal(read("layers.exr").get("R"), read("plain-layers.exr").get("R")));
 }
 
 TEST_F(LayersDenoise, WhereNothingTellsTheNoiseBinsGetTheColoursOfTheirLayers) {
