@@ -10,6 +10,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "flat/tonemap.h"
 #include "tests/reference/metrics.h"
 
 namespace fathom::flat {
@@ -52,6 +53,18 @@ std::string errorOf(const Image& image, const Image& reference, const MetricPara
     return e.what();
   }
   return "";
+}
+
+TEST(ToneMap, RisesFromBlackToWhiteForAnyValue) {
+  EXPECT_EQ(toneMap(-kInfinity), 0);
+  EXPECT_EQ(toneMap(-1), 0);
+  EXPECT_EQ(toneMap(0), 0);
+  EXPECT_EQ(toneMap(kNan), 0);
+  EXPECT_NEAR(toneMap(1), srgb(0.5), 1e-15);
+  EXPECT_NEAR(toneMap(0.002), 12.92 * 0.002 / 1.002, 1e-15);
+  EXPECT_LT(toneMap(100), toneMap(1000));
+  EXPECT_EQ(toneMap(1e300), 1);
+  EXPECT_EQ(toneMap(kInfinity), 1);
 }
 
 TEST(Metrics, EqualImagesHaveNoError) {

@@ -71,9 +71,15 @@ TEST(StressLevel, IsTheMeanOfWhatIsNotFarAbove) {
   EXPECT_FLOAT_EQ(levelOf({1, stress::kNan, stress::kInfinity, 1e16f}), 1);
   EXPECT_FLOAT_EQ(levelOf({1e-14f, 1e-14f}), 1e-14f);
   EXPECT_EQ(levelOf({1e-42f, 1e-42f}), 0.5f);
+  EXPECT_FLOAT_EQ(levelOf({1, 1, 1, 1, 1023}), 1027 / 5.0f);
+  EXPECT_FLOAT_EQ(levelOf({1, 1, 1, 1, 1024}), 1);  // the first power of two above a thousand times the others
   std::vector<float> sun(1000, 0.5f);
   std::fill_n(sun.begin(), 9, 1e5f);
   EXPECT_FLOAT_EQ(levelOf(sun), 0.5f);
+  std::fill_n(sun.begin(), 10, 1e5f);
+  EXPECT_FLOAT_EQ(levelOf(sun), 0.5f);
+  std::fill_n(sun.begin(), 11, 1e5f);
+  EXPECT_NEAR(levelOf(sun), 1100.5, 0.1);
   std::fill_n(sun.begin(), 20, 1e5f);
   EXPECT_NEAR(levelOf(sun), 2000, 1);
 }
