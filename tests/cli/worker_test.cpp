@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <future>
 #include <memory>
 #include <semaphore>
 #include <thread>
@@ -50,14 +51,15 @@ TEST(Worker, GivesResultsAndThrowsOnFromOneThread) {
     where.push_back(std::this_thread::get_id());
     throw Error("no more paper");
   });
-  // What can only be moved comes and goes.
-  std::future<std::unique_ptr<int>> moved = worker.result([&, held = std::make_unique<int>(5)]() mutable {
+  std::promise<int> promise;  // what can only be moved goes, too
+  std::future<int> promised = promise.get_future();
+  worker.result([&, promise = std::move(promise)]() mutable {
     where.push_back(std::this_thread::get_id());
-    return std::move(held);
+    promise.set_value(5);
   });
   EXPECT_EQ(number.get(), 3);
   EXPECT_THROW(failing.get(), Error);
-  EXPECT_EQ(*moved.get(), 5);
+  EXPECT_EQ(promised.get(), 5);
   EXPECT_THAT(where, Each(where.front()));
   EXPECT_NE(where.front(), std::this_thread::get_id());
 }
