@@ -177,8 +177,8 @@ void addDenoise(CLI::App& app) {
       ->default_str("bins");
   option("--flat-guide", command->request.guide, "auto|nlm|neural|oidn|layers|none|FILE",
          "What the bins of a deep IN shall add up to, a denoised flat frame: of Fathom's own filter, of its network or "
-         "Open Image Denoise, which also help with the bins, or in a file; auto is oidn where that is installed (but "
-         "for fast), else nlm for best")
+         "Open Image Denoise, which also help with the bins, or in a file; auto is none for fast, else oidn where "
+         "that is installed, else layers up to 8 samples a pixel, and neural")
       ->default_str(command->request.guide);
   sub->add_flag("--error", command->request.errors,
                 "Also write the estimated squared errors of the colours as error.{R,G,B}, of deep frames those of the "

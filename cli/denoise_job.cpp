@@ -6,15 +6,18 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <functional>
+#include <numeric>
 
 #include "base/error.h"
 #include "cli/calibration.h"
 #include "cli/denoise_budget.h"
 #include "cli/memory_limit.h"
 #include "cli/method_choice.h"
+#include "cli/model_files.h"
 #include "deep/flat_nl_means.h"
 #include "deep/one_bin.h"
 #include "flat/noise.h"
@@ -199,21 +202,54 @@ void chooseBase(SequencePlan& plan, DenoiseRequest& request, const Sample& sampl
   plan.notes.insert(fmt::format("{}: denoised by {}, which {}", plan.first, choice.name, choice.why));
 }
 
+// Up to so many camera samples per pixel the layered network is the better guide of ours, flattened and per bin, for no
+// more time; at 16 it no longer is (docs/notes.md, Training the layered network).
+constexpr double kFewSamples = 8;
+constexpr int kRowsOfCounts = 64;
+
+// What the file says, else the median of its counts in the middle; nothing where neither tells.
+std::optional<double> samplesPerPixel(FrameSource& source) {
+  if (const auto spp = source.part().attributes.getInt("fathom:spp"); spp && *spp > 0) return *spp;
+  const Box middle = middleOf(source.part().dataWindow);
+  std::set<std::string> told;
+  const deep::DeepImage rows = source.read(middle.y0, std::min(middle.y0 + kRowsOfCounts, middle.y1), told);
+  const deep::Channel* counts = rows.find("samples");
+  std::vector<double> sums;
+  for (size_t pixel = 0; counts && pixel < rows.pixels(); ++pixel) {
+    const auto first = counts->values.begin() + ptrdiff_t(rows.offsets[pixel]);
+    if (rows.count(pixel) > 0) sums.push_back(std::accumulate(first, first + ptrdiff_t(rows.count(pixel)), 0.0));
+  }
+  if (sums.empty()) return {};
+  const auto middlemost = sums.begin() + ptrdiff_t(sums.size() / 2);
+  std::ranges::nth_element(sums, middlemost);
+  return *middlemost;
+}
+
+// Whether `auto` may be the layered network: nothing is asked for that it lacks, and Open Image Denoise is not there.
+bool mayBeLayers(const SequencePlan& plan, const DenoiseRequest& request) {
+  return guideChoice(request) == "auto" && request.base.model.empty() && !request.timeBudget && !request.errors &&
+         plan.denoise.params.filter == deep::FilterKind::Own && plan.denoise.params.quality != deep::Quality::Fast &&
+         canBeGuided(plan.denoise.inputs) && !findOidn(request.base.oidnLibrary) && hasLayersModel();
+}
+
 // What guides the bins of deep frames.
 void setGuide(SequencePlan& plan, const DenoiseRequest& request, const SourceOptions& options,
               const std::vector<FrameInputs>& candidates) {
   const auto first =
       std::ranges::find_if(candidates, [&](const FrameInputs& inputs) { return inputs.main == plan.first; });
   FrameSource source = openFrame(*first, options, plan);
-  if (guideChoice(request) == kLayersBase) {
-    LayersOptions layers = request.layers;
-    layers.output = LayersOutput::Bins;
-    plan.guide = layersGuide(planLayers(request.base, layers, plan.denoise.params.quality, request.memory), options,
-                             plan.cameraSamples);
-    plan.denoise.guided = true;
-    return;
+  const Box& window = source.part().dataWindow;
+  const bool asked = guideChoice(request) == kLayersBase;
+  if (asked || (mayBeLayers(plan, request) && samplesPerPixel(source).value_or(HUGE_VAL) <= kFewSamples)) {
+    const LayersPlan layers = planLayers(request.base, {request.layers.count, LayersOutput::Bins},
+                                         plan.denoise.params.quality, request.memory);
+    const GuidePlan guide = layersGuide(layers, options, plan.cameraSamples);
+    if (asked || (layersFit(layers, window) && guideFits(guide, window.area(), request.memory))) plan.guide = guide;
+    if (plan.guide && !asked)
+      plan.notes.insert(fmt::format("{}: bins are guided by the layered network, as samples are few", plan.first));
   }
-  plan.guide = planGuide(guideChoice(request), request.base, plan.denoise, source, request.memory, plan.notes);
+  if (!plan.guide)
+    plan.guide = planGuide(guideChoice(request), request.base, plan.denoise, source, request.memory, plan.notes);
   plan.denoise.guided = plan.guide.has_value();
 }
 

@@ -108,12 +108,6 @@ NamedGuide bestGuide(std::vector<NamedGuide> guides, const deep::DenoisePlan& pl
   return std::move(guides[best]);
 }
 
-bool fits(const GuidePlan& guide, size_t pixels, size_t memory) {
-  const GuideBytes bytes = guideBytes(guide, pixels, memory);
-  const size_t all = pixels * (bytes.madePerPixel + bytes.keptPerPixel) + bytes.library;
-  return double(all) <= kMostOfMemory * double(workingBytes(memory));
-}
-
 // The plan's denoisers, or one that reads the frame's files; for as long as both are there.
 deep::GuideDenoisers denoisersOf(const GuidePlan& guide, const FrameInputs& inputs) {
   deep::GuideDenoisers denoisers = guide.denoisers;
@@ -140,11 +134,17 @@ GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory) {
   return bytes;
 }
 
+bool guideFits(const GuidePlan& guide, size_t pixels, size_t memory) {
+  const GuideBytes bytes = guideBytes(guide, pixels, memory);
+  const size_t all = pixels * (bytes.madePerPixel + bytes.keptPerPixel) + bytes.library;
+  return double(all) <= kMostOfMemory * double(workingBytes(memory));
+}
+
 bool guideFits(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan, size_t pixels,
                size_t memory) {
   const size_t scratch = decodedLimit(memory);
-  if (choice == kNeuralBase) return fits(neuralGuide(base, plan, scratch), pixels, memory);
-  if (choice == kOidnBase) return fits(oidnGuide(flat::loadOidn(base.oidnLibrary), true, scratch), pixels, memory);
+  if (choice == kNeuralBase) return guideFits(neuralGuide(base, plan, scratch), pixels, memory);
+  if (choice == kOidnBase) return guideFits(oidnGuide(flat::loadOidn(base.oidnLibrary), true, scratch), pixels, memory);
   return true;
 }
 
@@ -168,7 +168,7 @@ std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions&
   if (choice == "auto" && (base.name == kAutoBase || guides.empty()) && hasModel(base))
     guides.push_back({"the network", "the network", neuralGuide(base, plan, scratch)});
   std::erase_if(guides, [&](const NamedGuide& guide) {
-    if (choice != "auto" || fits(guide.plan, source.part().dataWindow.area(), memory)) return false;
+    if (choice != "auto" || guideFits(guide.plan, source.part().dataWindow.area(), memory)) return false;
     notes.insert(
         fmt::format("{}: no guide by {}: whole frames of it take more than the memory", source.path(), guide.who));
     return true;

@@ -33,15 +33,17 @@ GuideBytes guideBytes(const GuidePlan& guide, size_t pixels, size_t memory);
 // Whether frames that offer this say enough of their noise to be guided.
 bool canBeGuided(const deep::DenoiseInputs& inputs);
 
-// Whether a guide of whole frames, nlm (which is none), neural or oidn, leaves memory for a frame of so many pixels itself.
-// Throws Error where its library or model cannot be had.
+// Whether a guide of whole frames leaves memory for a frame of so many pixels itself, in a run that may take `memory` bytes.
+bool guideFits(const GuidePlan& guide, size_t pixels, size_t memory);
+
+// The same of nlm (which is none), neural or oidn. Throws Error where its library or model cannot be had.
 bool guideFits(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan, size_t pixels,
                size_t memory);
 
 // The plan for a choice: auto, nlm, neural, oidn, none (then there is none) or a file. `oidn` prefilters its own guides
 // where that promises the smaller error (cli/method_choice, on the middle of the first frame, `source`). `neural` is
 // `base` where no model is named: `small` is no gain. `auto` is Open Image Denoise where it is found, else the network
-// where it is installed: bins and pixels take of a guide what the noisy frame confirms, and gain even where it is worse
+// where it is installed (of few samples the layered one, which cli/denoise_job takes instead): bins and pixels take of a guide what the noisy frame confirms, and gain even where it is worse
 // than our own filter (fur). Where the base is to be chosen (kAutoBase), the network may promise less error than Open
 // Image Denoise and take its place. Both take whole frames; where that is more than `memory` bytes for `source`, or where
 // neither is there, Quality::Best takes our own flat filter, which makes the flattened frame as good as any flat one, for

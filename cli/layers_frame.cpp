@@ -65,6 +65,10 @@ LayersPlan planLayers(const BaseOptions& base, const LayersOptions& options, dee
                       nameOf(options.output))};
 }
 
+bool layersFit(const LayersPlan& plan, const Box& dataWindow) {
+  return plan.params.memory >= deep::leastLayersBytes(*plan.net, plan.params.layers, 2, dataWindow);
+}
+
 LayersFrame::LayersFrame(const LayersPlan& plan, const FrameInputs& inputs, const SourceOptions& options,
                          bool clustered)
     : plan_(plan), source_(inputs, options), layers_(prepare(source_, clustered, notes_, attributes_)) {

@@ -37,6 +37,9 @@ struct LayersPlan {
 // `memory`: of the whole run. Throws Error where the model cannot be had.
 LayersPlan planLayers(const BaseOptions& base, const LayersOptions& options, deep::Quality quality, size_t memory);
 
+// Whether the plan's memory does for frames of this data window.
+bool layersFit(const LayersPlan& plan, const Box& dataWindow);
+
 // One frame on its way through the network.
 class LayersFrame {
  public:

@@ -100,6 +100,10 @@ bool isLayersModel(const std::string& path) {
   return textOf(file, "format") == "fathom-layers";
 }
 
+bool hasLayersModel() {
+  return !installed(kLayersModel).empty();
+}
+
 bool hasMix() {
   return !installed(kMixModel).empty();
 }

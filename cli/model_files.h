@@ -42,6 +42,9 @@ constexpr const char* kLayersModel = "layers";
 Model loadModel(const std::string& model, nn::Precision precision = nn::Precision::float32);
 LayersModel loadLayersModel(const std::string& model, nn::Precision precision = nn::Precision::float32);
 
+// Whether the layered network is installed.
+bool hasLayersModel();
+
 // Whether a file of weights is of the layered network.
 bool isLayersModel(const std::string& path);
 

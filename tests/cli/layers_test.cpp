@@ -105,6 +105,32 @@ TEST_F(LayersDenoise, BinsFollowItAsANetworkOfOurs) {
   EXPECT_EQ(cli::layersGuide(plan, {}, false).denoisers.consistency.mix.prior, deep::kNetworkGuide.mix.prior);
 }
 
+// Open Image Denoise is not there, nor a network of flat frames.
+TEST_F(LayersDenoise, GuidesFramesOfFewSamplesByItself) {
+  const auto guided = [&](const deep::DeepImage& image, const std::string& more = "") {
+    deep::write(folder_ / "some.exr", image);
+    const Ran outcome = fathom("denoise some.exr -o auto.exr --overwrite " + more);
+    expectFine(outcome);
+    return outcome.err.find("bins are guided by the layered network, as samples are few") != std::string::npos;
+  };
+  deep::DeepImage image = read("in.exr");
+  image.attributes.set("fathom:spp", 8);
+  EXPECT_TRUE(guided(image));
+  expectFine(fathom("denoise some.exr -o layers.exr --flat-guide layers"));
+  EXPECT_TRUE(std::ranges::equal(read("auto.exr").get("R"), read("layers.exr").get("R")));
+  for (const char* more : {"--quality fast", "--error", "--flat-guide none", "--filter paper", "--memory 40M"})
+    EXPECT_FALSE(guided(image, more)) << more;
+  image.attributes.set("fathom:spp", 9);
+  EXPECT_FALSE(guided(image));
+  expectFine(fathom("denoise some.exr -o none.exr --flat-guide none"));
+  EXPECT_TRUE(std::ranges::equal(read("auto.exr").get("R"), read("none.exr").get("R")));
+  // Where the file does not say, by its counts.
+  image.attributes.erase("fathom:spp");
+  EXPECT_FALSE(guided(image));
+  for (float& count : image.find("samples")->values) count /= 2;
+  EXPECT_TRUE(guided(image));
+}
+
 // What the viewer reads of a file, and what other commands make of it.
 TEST_F(LayersDenoise, LayersAreAPlainDeepFile) {
   expectFine(run("in.exr -o layers.exr --as layers"));
