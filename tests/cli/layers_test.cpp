@@ -145,7 +145,7 @@ TEST_F(LayersDenoise, LayersAreAPlainDeepFile) {
 TEST_F(LayersDenoise, BinsKeepTheirPlaces) {
   const deep::DeepImage in = read("in.exr");
   for (const std::string as : {"bins", "layer-bins"}) {
-    expectFine(run("in.exr -o " + as + ".exr --as " + as));
+    expectFine(run(fmt::format("in.exr -o {0}.exr --as {0}", as)));
     const deep::DeepImage out = read(as + ".exr");
     for (const char* name : {"A", "Z"})
       EXPECT_TRUE(std::ranges::equal(out.get(name), in.get(name))) << as << " " << name;
