@@ -43,12 +43,13 @@ bool guideFits(const std::string& choice, const BaseOptions& base, const deep::D
 // The plan for a choice: auto, nlm, neural, oidn, none (then there is none) or a file. `oidn` prefilters its own guides
 // where that promises the smaller error (cli/method_choice, on the middle of the first frame, `source`). `neural` is
 // `base` where no model is named: `small` is no gain. `auto` is Open Image Denoise where it is found, else the network
-// where it is installed (of few samples the layered one, which cli/denoise_job takes instead): bins and pixels take of a guide what the noisy frame confirms, and gain even where it is worse
-// than our own filter (fur). Where the base is to be chosen (kAutoBase), the network may promise less error than Open
-// Image Denoise and take its place. Both take whole frames; where that is more than `memory` bytes for `source`, or where
-// neither is there, Quality::Best takes our own flat filter, which makes the flattened frame as good as any flat one, for
-// two thirds more time. No guide for Quality::Fast, for published filters and for frames that say nothing of their noise.
-// Adds to `notes` what it chose, where there was a choice, and what did not fit. Throws Error where the choice cannot be had.
+// where it is installed (cli/denoise_job takes the layered one instead where samples are few): bins and pixels take of a
+// guide what the noisy frame confirms, and gain even where it is worse than our own filter (fur). Where the base is to be
+// chosen (kAutoBase), the network may promise less error than Open Image Denoise and take its place. Both take whole
+// frames; where that is more than `memory` bytes for `source`, or where neither is there, Quality::Best takes our own flat
+// filter, which makes the flattened frame as good as any flat one, for two thirds more time. No guide for Quality::Fast,
+// for published filters and for frames that say nothing of their noise. Adds to `notes` what it chose, where there was a
+// choice, and what did not fit. Throws Error where the choice cannot be had.
 std::optional<GuidePlan> planGuide(const std::string& choice, const BaseOptions& base, const deep::DenoisePlan& plan,
                                    FrameSource& source, size_t memory, std::set<std::string>& notes);
 
