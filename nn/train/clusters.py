@@ -48,13 +48,11 @@ def gathered(values, counts, label):
     return result, pixel[start]
 
 
-def chosen(random, values, counts, spp, wanted):
-    """Some of each pixel's `spp` camera samples, misses among them: values and counts as given, in the same order."""
+def chosen(random, samples, wanted):
+    """So many of the camera samples of each pixel, (..., spp, PHYSICAL), misses among them, in their order."""
+    spp = samples.shape[-2]
     if wanted == spp:
-        return values, counts
-    pixels = len(values)
-    keys = random.random((pixels, spp))
-    kept = keys <= np.partition(keys, wanted - 1, 1)[:, wanted - 1 : wanted]
-    kept &= np.arange(spp) < counts[:, None]
-    order = np.argsort(~kept, 1, kind="stable")[:, :wanted]
-    return np.take_along_axis(values, order[:, :, None], 1), kept.sum(1)
+        return samples
+    keys = random.random(samples.shape[:-1], np.float32)
+    kept = np.sort(np.argpartition(keys, wanted - 1, -1)[..., :wanted], -1)
+    return np.take_along_axis(samples, kept[..., None], -2)

@@ -11,7 +11,8 @@ from samples import FEATURES, UNKNOWN_ALBEDO, WHERE, WIDTH, divided, inputs, lig
 
 # Raw camera samples; bins of them; all of a pixel in one, which is what a network on pixels sees.
 FORMS = {"samples": 0.5, "bins": 0.35, "pixels": 0.15}
-WANTED = {1.0: 0.45, 0.5: 0.3, 0.25: 0.25}  # share of the camera samples that are taken
+COUNTS = {2: 0.1, 4: 0.2, 8: 0.35, 16: 0.1, 32: 0.15, 64: 0.1}  # camera samples per pixel that are taken
+MOST_RAW = 16  # and of raw ones, which cost most and gain least where there are many
 EXPONENTS, FIRSTS = (1.0, 1.5, 2.0, 3.0), (0, 1)  # of the clustering
 
 # How often a feature is taken away. Bins seldom know where on the lens their samples were.
@@ -25,11 +26,15 @@ PANELS, LIT, LIGHT_STOPS, BEHIND = 0.25, 0.5, (-2.0, 4.5), (1.02, 4.0)
 PANEL_SIDES = (0.1, 0.8)  # half of a panel's sides over half of the crop's
 
 
-def formed(random, form, samples, spp, scale):
+def drawn_count(random, form, spp):
+    counts = [n for n in COUNTS if n <= spp and (form != "samples" or n <= MOST_RAW)] or [spp]
+    shares = np.array([COUNTS.get(n, 1) for n in counts])
+    return int(random.choice(counts, p=shares / shares.sum()))
+
+
+def formed(random, form, samples, scale):
     """The columns of samples.py, weights and pixels of a crop's (pixels, spp, PHYSICAL) samples."""
-    wanted = max(1, round(spp * random.choice(list(WANTED), p=list(WANTED.values()))))
     counts = (samples[:, :, WHERE["depth"].start] > 0).sum(1)
-    samples, counts = chosen(random, samples, counts, spp, wanted)
     if form == "samples":
         there = np.arange(samples.shape[1]) < counts[:, None]
         values = np.zeros((int(counts.sum()), WIDTH), np.float32)
@@ -42,7 +47,7 @@ def formed(random, form, samples, spp, scale):
         else:
             label = np.zeros(samples.shape[:2], np.int64)
         values, pixel = gathered(samples, counts, label)
-    return values, values[:, WHERE["count"]][:, 0] / wanted, pixel
+    return values, values[:, WHERE["count"]][:, 0] / samples.shape[1], pixel
 
 
 def without(values, gone):
@@ -152,6 +157,8 @@ LIT_TARGETS = [0, 1, 2, 5, 6, 7]
 
 def varied(random, frame, samples, targets):
     """What layers_model.assembled takes of a variation of the crop, and its targets (height, width, 8), light times the exposure."""
+    form = random.choice(list(FORMS), p=list(FORMS.values()))
+    samples = chosen(random, samples, drawn_count(random, form, frame.spp)).astype(np.float32)
     samples, targets = turned(random, samples, targets)
     if random.random() < PANELS:
         with_panel(random, samples, targets, frame.exposure)
@@ -165,8 +172,7 @@ def varied(random, frame, samples, targets):
         if random.random() < augment.SHOWN["albedo"]:
             albedo = samples[..., WHERE["albedo"]]
             np.minimum(albedo * pattern[..., None], 1, out=albedo)
-    form = random.choice(list(FORMS), p=list(FORMS.values()))
-    values, weight, pixel = formed(random, form, samples.reshape(-1, *samples.shape[2:]), frame.spp, frame.scale)
+    values, weight, pixel = formed(random, form, samples.reshape(-1, *samples.shape[2:]), frame.scale)
     gone = missing(random, frame.given)
     without(values, gone)
     apart = light == "diffuse" and "components" not in gone

@@ -1,6 +1,6 @@
 """A cache of camera samples, and crops from it.
 
-As `crops.py`, of files of samples: NAME.npy, float32 (height, width, n), has the samples of a pixel behind one another, front to back, in the
+As `crops.py`, of files of samples: NAME.npy, float16 (height, width, n), has the samples of a pixel behind one another, front to back, in the
 first columns of samples.py (depth 0: none), and behind them the reference's light of all LIGHTS (as much as it has), alpha, and whether these
 count: samples know nothing of an environment that is seen where nothing was hit.
 """
@@ -14,7 +14,7 @@ from clusters import PHYSICAL
 from exr import read, read_deep
 from planes import LIGHTS, component
 
-VERSION = 2
+VERSION = 3
 TARGETS = 3 * len(LIGHTS) + 2  # lights, alpha, counts
 SEVERAL = 0.3  # interest of a pixel that sees more than one depth
 APART = 1.03  # ratio of depths that counts as two
@@ -79,7 +79,7 @@ def prepare(pair, size):
         "version": VERSION, "name": pair.name, "scene": pair.scene, "spp": spp, "exposure": scale, "depth": samples.mean_depth(deep),
         "scale": float(attributes["fathom:ppuScale"]), "given": sorted(deep.given), "apart": apart, "size": size, "acceptance": probabilities.round(3).tolist(),
     }  # fmt: skip
-    return pixels.astype(np.float32), description
+    return np.clip(pixels, -crops.LARGEST, crops.LARGEST).astype(np.float16), description
 
 
 class Frame(crops.Frame):
@@ -90,9 +90,9 @@ class Frame(crops.Frame):
         self.sides = self.pixels.shape[:2]
 
     def crop(self, y, x, size):
-        """(size, size, spp, PHYSICAL) samples, and (size, size, TARGETS)."""
+        """(size, size, spp, PHYSICAL) samples, float16, and (size, size, TARGETS), float32."""
         pixels = np.asarray(self.pixels[y : y + size, x : x + size])
-        return pixels[..., :-TARGETS].reshape(size, size, self.spp, PHYSICAL), pixels[..., -TARGETS:]
+        return pixels[..., :-TARGETS].reshape(size, size, self.spp, PHYSICAL), pixels[..., -TARGETS:].astype(np.float32)
 
 
 class Cache(crops.Cache):

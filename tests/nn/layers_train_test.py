@@ -106,16 +106,28 @@ class Clusters(unittest.TestCase):
     def test_some_samples_of_all_and_misses_among_them(self):
         random = np.random.default_rng(3)
         counts = np.repeat([0, 3, 8], 4000)
-        values = np.where(np.arange(8) < counts[:, None], np.arange(1, 9), 0)[:, :, None].astype(np.float32)
-        some, left = clusters.chosen(random, values, counts, 8, 4)
-        self.assertEqual(some.shape, (12000, 4, 1))
+        values = np.where(np.arange(8) < counts[:, None], np.arange(1, 9), 0)[:, :, None].astype(np.float16)
+        some = clusters.chosen(random, values, 4)
+        self.assertEqual((some.shape, some.dtype), ((12000, 4, 1), np.float16))
+        left = (some[:, :, 0] > 0).sum(1)
         np.testing.assert_array_equal(left[:4000], 0)
         np.testing.assert_array_equal(left[8000:], 4)
         self.assertAlmostEqual(left[4000:8000].mean(), 1.5, delta=0.05)
         self.assertTrue((np.diff(some[8000:, :, 0]) > 0).all())
-        self.assertAlmostEqual(some[8000:].mean(), 4.5, delta=0.05)
+        self.assertAlmostEqual(some[8000:].astype(float).mean(), 4.5, delta=0.05)
         kept = np.arange(4) < left[:, None]
         self.assertTrue((some[kept] > 0).all())
+        self.assertIs(clusters.chosen(random, values, 8), values)
+
+    def test_raw_samples_are_few(self):
+        random, drawn = np.random.default_rng(4), {}
+        for form in layers_augment.FORMS:
+            for spp in (1, 8, 64, 100):
+                drawn[form, spp] = {layers_augment.drawn_count(random, form, spp) for _ in range(300)}
+        for (form, spp), counts in drawn.items():
+            most = min(spp, layers_augment.MOST_RAW if form == "samples" else 64)
+            self.assertEqual(max(counts), most, (form, spp))
+            self.assertEqual(len(counts), 1 if spp == 1 else int(np.log2(most)), (form, spp))
 
 
 class Data(unittest.TestCase):
@@ -159,11 +171,11 @@ class Data(unittest.TestCase):
         frame = self.cache().frames[0]
         pixels, targets = frame.crop(3, 5, 32)
         targets = np.array(targets)
-        targets[..., 3:6], targets[..., 6:9] = pixels[..., :3].sum(2) / SPP, pixels[..., 3:6].sum(2) / SPP
+        targets[..., 3:6], targets[..., 6:9] = (pixels[..., k : k + 3].astype(np.float32).sum(2) / SPP for k in (0, 3))
         targets[..., :3] = targets[..., 3:6] + targets[..., 6:9]
         kinds, lights = set(), set()
-        layers_augment.WANTED, wanted = {1.0: 1.0}, layers_augment.WANTED
-        self.addCleanup(setattr, layers_augment, "WANTED", wanted)
+        layers_augment.COUNTS, counts = {SPP: 1.0}, layers_augment.COUNTS
+        self.addCleanup(setattr, layers_augment, "COUNTS", counts)
         for seed in range(40):
             (values, weight, light, z, divisor, pixel), target = layers_augment.varied(np.random.default_rng(seed), frame, pixels, targets.copy())
             self.assertTrue(np.isfinite(values).all() and (np.diff(pixel) >= 0).all() and (z > 0).all())
@@ -176,7 +188,7 @@ class Data(unittest.TestCase):
         self.assertEqual(lights, {(True, True), (True, False), (False, True)})
 
     def test_a_panel_gives_light_and_reflects_none(self):
-        pixels, targets = (np.array(x) for x in self.cache().frames[0].crop(3, 5, 32))
+        pixels, targets = (np.array(x, np.float32) for x in self.cache().frames[0].crop(3, 5, 32))
         there = pixels[..., samples.WHERE["depth"].start] > 0
         targets[..., -2] = there.mean(2)
         before, aims = pixels.copy(), targets.copy()
@@ -199,7 +211,7 @@ class Data(unittest.TestCase):
         self.assertLess(min(shares), 0.2)
 
     def test_a_backdrop_lights_what_was_empty(self):
-        pixels, targets = (np.array(x) for x in self.cache().frames[0].crop(3, 5, 32))
+        pixels, targets = (np.array(x, np.float32) for x in self.cache().frames[0].crop(3, 5, 32))
         pixels[10:13, :, 1:] = 0  # all but the nearest missed in a strip
         there = pixels[..., samples.WHERE["depth"].start] > 0
         targets[..., -2], targets[..., -1] = there.mean(2), 1

@@ -14,7 +14,6 @@ from camera import Camera
 
 SIZES = ((192, 144), (160, 160), (144, 192), (208, 128), (176, 152))
 SPP = {2: 0.15, 4: 0.2, 8: 0.2, 16: 0.2, 32: 0.15, 64: 0.1}  # of the noisy frames, and how often
-SAMPLES = 8  # camera samples per pixel that are kept one by one
 VIEWS = 3
 
 
@@ -83,17 +82,17 @@ def same_camera(path, camera):
     return np.allclose(header['worldToCamera'], camera.world_to_camera(), 1e-4, 1e-4) and np.isclose(header['fathom:ppuScale'], camera.scale)
 
 
-def complete(path, only_samples):
-    return os.path.exists(f'{path}.{SAMPLES}.samples.exr') and (only_samples or os.path.exists(path + '.ref.exr'))
+def complete(path, kept, only_samples):
+    return os.path.exists(f'{path}.{kept}.samples.exr') and (only_samples or os.path.exists(path + '.ref.exr'))
 
 
-def view(rng, scene, cameras, path):
-    """Write what is not there of path.SPP.samples.exr, two path.SPP.flat.exr and, last, path.ref.exr."""
+def view(rng, scene, cameras, path, kept):
+    """Write what is not there of path.KEPT.samples.exr, two path.SPP.flat.exr and, last, path.ref.exr."""
     start = time.time()
     camera, look = compose(rng, scene, cameras)
     counts = rng.choice(list(SPP), 2, replace=False, p=list(SPP.values()))
     seed = int(rng.integers(1 << 30))
-    reference, samples, made = path + '.ref.exr', f'{path}.{SAMPLES}.samples.exr', []
+    reference, samples, made = path + '.ref.exr', f'{path}.{kept}.samples.exr', []
     if os.path.exists(reference):
         if not same_camera(reference, camera):
             raise Unusable('its reference has another camera')
@@ -107,24 +106,24 @@ def view(rng, scene, cameras, path):
             frames.write(f'{path}.{count}.flat.exr', camera, int(count), frames.noisy(scene, camera, look, int(count), seed + 1000 * (k + 1)))
         made = [f'noisy {counts[0]} and {counts[1]}', f'reference {spp}']
     if not os.path.exists(samples):
-        deep.write(samples, camera, *frames.samples(scene, camera, look, SAMPLES, seed + 5000))
-        made = [f'samples {SAMPLES}', *made]
+        deep.write(samples, camera, *frames.samples(scene, camera, look, kept, seed + 5000))
+        made = [f'samples {kept}', *made]
     if not os.path.exists(reference):
         frames.write(reference, camera, spp, channels)
     print(f'{path}: {camera.width}x{camera.height}, {", ".join(made)}, {time.time() - start:.1f} s', flush=True)
 
 
-def run(index, out, scenes, hdri, kind='', only_samples=False):
-    """All views of a job; with `only_samples` the samples alone, of views that have a reference."""
+def run(index, out, scenes, hdri, kind='', kept=64, only_samples=False):
+    """All views of a job, with files of `kept` camera samples per pixel; with `only_samples` the samples alone, of views that have a reference."""
     folder = os.path.join(out, folder_of(index, scenes, kind))
     paths = [os.path.join(folder, f'{index:05}-{k}') for k in range(VIEWS)]
-    wanted = [k for k, p in enumerate(paths) if not complete(p, only_samples) and (not only_samples or os.path.exists(p + '.ref.exr'))]
+    wanted = [k for k, p in enumerate(paths) if not complete(p, kept, only_samples) and (not only_samples or os.path.exists(p + '.ref.exr'))]
     if not wanted:
         return
     scene, cameras = scene_of(index, scenes, hdri, kind)
     os.makedirs(folder, exist_ok=True)
     for k in wanted:
         try:
-            view(np.random.default_rng([11, index, k]), scene, cameras, paths[k])
+            view(np.random.default_rng([11, index, k]), scene, cameras, paths[k], kept)
         except Unusable as why:
             print(f'{paths[k]}: skipped: {why}', flush=True)

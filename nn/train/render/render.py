@@ -30,7 +30,7 @@ def work(args, first, last):
     for index in range(first, last):
         print(f'job {index}', flush=True)
         try:
-            job.run(index, args.out, scenes, args.hdri, args.kind, args.only_samples)
+            job.run(index, args.out, scenes, args.hdri, args.kind, args.samples, args.only_samples)
         except Exception as e:
             print(f'job {index}: skipped: {type(e).__name__}: {str(e).splitlines()[0] if str(e) else ""}', flush=True)
         dr.flush_malloc_cache()
@@ -69,6 +69,7 @@ def main():
     p.add_argument('--scenes', default='', help='folder of NAME/scene.xml; none: random scenes alone')
     p.add_argument('--jobs', type=span, default=(0, 200), help='indices FIRST:END; three views each')
     p.add_argument('--kind', default='', help='random scenes of one kind alone: outdoors, studio, room, clutter, veil or pelt')
+    p.add_argument('--samples', type=int, default=64, help='camera samples per pixel that are kept one by one; training takes some of them')
     p.add_argument('--only-samples', action='store_true', help='add files of samples to views that have a reference, and render nothing else')
     p.add_argument('--threads', type=int, default=os.cpu_count())
     p.add_argument('--batch', type=int, default=8, help='jobs per process')

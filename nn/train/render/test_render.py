@@ -141,7 +141,7 @@ class Batches(unittest.TestCase):
         job.SIZES, job.SPP, job.VIEWS = ((64, 64),), {2: 0.5, 4: 0.5}, 1
         with tempfile.TemporaryDirectory() as a, tempfile.TemporaryDirectory() as b, contextlib.redirect_stdout(io.StringIO()):
             for folder in (a, b):
-                job.run(0, folder, [], '')
+                job.run(0, folder, [], '', kept=8)
             names = sorted(os.listdir(os.path.join(a, 'random.00000')))
             self.assertEqual(names, ['00000-0.2.flat.exr', '00000-0.4.flat.exr', '00000-0.8.samples.exr', '00000-0.ref.exr'])
             flat = lambda x: np.concatenate([p for p in x.ravel() if p is not None]) if x.dtype == object else x
@@ -150,14 +150,14 @@ class Batches(unittest.TestCase):
                 one, two = read(a, n), read(b, n)
                 self.assertTrue(all(np.array_equal(one[k], two[k]) for k in one | two))
             before = [os.stat(os.path.join(a, 'random.00000', n)).st_mtime_ns for n in names]
-            job.run(0, a, [], '')
+            job.run(0, a, [], '', kept=8)
             self.assertEqual(before, [os.stat(os.path.join(a, 'random.00000', n)).st_mtime_ns for n in names])
             samples = os.path.join(a, 'random.00000', names[2])
             os.remove(samples)
-            job.run(0, a, [], '', only_samples=True)
+            job.run(0, a, [], '', kept=8, only_samples=True)
             one, two = read(a, names[2]), read(b, names[2])
             self.assertTrue(all(np.array_equal(one[k], two[k]) for k in one | two))
-            job.run(1, a, [], '', only_samples=True)
+            job.run(1, a, [], '', kept=8, only_samples=True)
             self.assertFalse(os.path.exists(os.path.join(a, 'random.00001')))
 
     def test_a_broken_scene_is_skipped_with_a_line_and_held_out_ones_are_never_read(self):
