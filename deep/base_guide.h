@@ -24,15 +24,16 @@ struct ConsistencyParams {
   float relative = 0.005f;
   float noise = 0.1f;
   float alphaNoise = 0.25f;
-  float mostDeviations = 3;
+  float mostDeviations = 10;
   // The prior share of the bins' own sum in what a pixel should be, and its strength (flat/mix).
   flat::MixParams mix{.prior = 0.4f, .strength = 20};
   // The prior share of the deep filter's bins in their mix with the pictures' (deep/bin_mix).
   float binPrior = 0.5f;
 };
 
-// For our own networks, which err more than Open Image Denoise does.
-inline constexpr ConsistencyParams kNetworkGuide{.mix = {.prior = 0.5f, .strength = 20}, .binPrior = 0.6f};
+// For our own networks, which err more than Open Image Denoise does, and leave noise of the render in what they make, which
+// a weak prior takes for detail.
+inline constexpr ConsistencyParams kNetworkGuide{.mix = {.prior = 0.55f, .strength = 200}, .binPrior = 0.6f};
 
 // For a guide that errs as much as the bins' sum, and alike: our own filter on flat pixels.
 inline constexpr ConsistencyParams kOwnGuide{.alphaNoise = 0.5f, .mix = {.prior = 0.8f, .strength = 20}};

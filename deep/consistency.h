@@ -6,8 +6,8 @@
 // The alphas are noisy, too, and F is not: N camera samples leave a variance a = (sum w c^2 - (sum w c)^2) / N that is no
 // fault of the bins' colours. It goes into the denominator, a part of it: with all of it the flattened frame misses
 // a good guide by a tenth where bins differ much, with none the bins follow it across depth edges (pixels that a clip
-// plane cuts had up to 1.7 times their error). No light becomes negative, and no bin moves by more than three of its
-// own deviations.
+// plane cuts had up to 1.7 times their error). No light becomes negative, and no bin moves by more than ten of its
+// own deviations: with three, dark bins whose few samples missed the light, and so are sure of it, stay dark dots.
 #pragma once
 
 #include <span>

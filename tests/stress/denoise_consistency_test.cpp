@@ -92,7 +92,8 @@ TEST(StressConsistency, EqualsItsFormula) {
                 ASSERT_TRUE(stress::sameBits(found, before[3 * b + c]));
                 continue;
               }
-              const double v = errorOf(gates[b], c, value, params, least), most = 3 * std::sqrt(v);
+              const double v = errorOf(gates[b], c, value, params, least),
+                           most = double(params.mostDeviations) * std::sqrt(v);
               if (std::fabs(change / all) > 0.9e15) continue;  // what cannot be told is left
               const double moved =
                   std::max(value + std::clamp(v * w * change / all, -most, most), std::min(value, 0.0));
