@@ -10,6 +10,8 @@ it begins with those of a layered denoiser, or with the U-net of a compositional
 Each step draws L from {1, 2, 4}. Batches are of the same size for all, since the layers are a small part of the work.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+
 import torch
 
 import evaluate_layers
@@ -49,7 +51,16 @@ class Training(train.Training):
     def frames_and_batches(self):
         settings = self.settings
         cache = layers_crops.Cache(settings.out / "cache", settings.data, settings.crop, settings.share)
+        self.beside, self.ahead = ThreadPoolExecutor(1), None
         return cache, Batches(cache, settings.crop, settings.seed)
+
+    def batch(self):
+        """That of this step. The next one is begun beside the work on it, unless frames may come before."""
+        count = self.settings.batch
+        made = self.ahead.result() if self.ahead else self.batches.batch(self.step, count)
+        coming = (self.step + 1) % self.settings.validate == 0
+        self.ahead = None if coming else self.beside.submit(self.batches.batch, self.step + 1, count)
+        return made
 
     def held_out(self):
         pairs = frames.find(self.settings.data, frames.SAMPLES)
@@ -58,7 +69,7 @@ class Training(train.Training):
 
     def losses_of_step(self):
         settings, layers = self.settings, self.drawn(SHARES)
-        samples, targets = self.batches.batch(self.step, settings.batch)
+        samples, targets = self.batch()
         with self.autocast():
             result = self.model.result(samples, layers)
         pixels = settings.batch * settings.crop**2
