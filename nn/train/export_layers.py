@@ -20,7 +20,7 @@ from layers_model import Layered
 from weights import load_model, save_model
 
 LIMITS = (
-    "Trained on path-traced frames of at most 8 samples per pixel (whole, or clustered into bins) of interiors, objects, hair and leaves, with and"
+    "Trained on path-traced frames of 2 to 16 samples per pixel, and of 2 to 64 clustered into bins, of interiors, objects, hair and leaves, with and"
     " without a lens; frames of another kind, or with far more samples, are outside of what it has seen. It knows no volumes, motion or time."
 )
 
@@ -53,7 +53,7 @@ def card(name, model, saved, rows, words):
         f"- Data: {words or 'renders with references'}: {len(saved['frames'])} frames of {len(saved['scenes'])} scenes: {', '.join(saved['scenes'])}.",
         f"- Limits: {LIMITS}",
         "",
-        "Errors on frames that no training sees, at 8 samples per pixel (relMSE less the reference's own error): of the samples with 1, 2 and 4 layers,"
+        "Errors on frames that no training sees, of 8 samples per pixel (relMSE less the reference's own error): of the samples with 1, 2 and 4 layers,"
         " and of one bin per pixel, which is what a network on pixels sees:",
         "",
         *table(rows),
