@@ -33,7 +33,7 @@ struct ConsistencyParams {
 
 // For our own networks, which err more than Open Image Denoise does, and leave noise of the render in what they make, which
 // a weak prior takes for detail.
-inline constexpr ConsistencyParams kNetworkGuide{.mix = {.prior = 0.55f, .strength = 200}, .binPrior = 0.6f};
+inline constexpr ConsistencyParams kNetworkGuide{.mix = {.prior = 0.55f, .strength = 40}, .binPrior = 0.6f};
 
 // For a guide that errs as much as the bins' sum, and alike: our own filter on flat pixels.
 inline constexpr ConsistencyParams kOwnGuide{.alphaNoise = 0.5f, .mix = {.prior = 0.8f, .strength = 20}};
