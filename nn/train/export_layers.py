@@ -48,7 +48,7 @@ def card(name, model, saved, rows, words):
         f"Weights of the layered denoiser (`nn/train/layers_model.py`), width {model.width}, {sum(x.numel() for x in model.parameters())} parameters."
         f" Licence: {LICENCE}, as Fathom's.",
         "",
-        f"- Trained in {saved['step']} steps ({saved['hours']:.1f} hours on {saved['threads']} processor core(s)) of {saved['batch']} crops of"
+        f"- Trained in {saved['step']} steps ({saved['hours']:.1f} hours on {saved['threads']} processor core(s), batches made on one more) of {saved['batch']} crops of"
         f" {saved['crop']}x{saved['crop']} pixels, with 1, 2 or 4 layers in turn; the weights are the running average.",
         f"- Data: {words or 'renders with references'}: {len(saved['frames'])} frames of {len(saved['scenes'])} scenes: {', '.join(saved['scenes'])}.",
         f"- Limits: {LIMITS}",

@@ -8,6 +8,7 @@
 
 #include "deep/alpha.h"
 #include "deep/base_guide.h"
+#include "deep/consistency.h"
 #include "deep/flat_nl_means.h"
 #include "deep/flatten.h"
 #include "tests/reference/rendered_frame.h"
@@ -98,6 +99,29 @@ TEST_F(Guided, ABadGuideDoesLittleHarm) {
   const Errors after = errorsOf(guided({knows(truth, wrong), {}, {}}), frame.truth);
   EXPECT_LT(after.flat - before.flat, 0.1 * guideError);
   EXPECT_LT(after.bins - before.bins, 0.1 * guideError);
+}
+
+// Few samples that all missed the light are sure that there is none.
+TEST_F(Guided, DarkBinsTakeTenOfTheirDeviationsFromIt) {
+  const DenoiseData data = prepareColours(frame.noisy, plan.inputs);
+  const BaseGuide guide = makeGuide(guideInput(frame.noisy, plan, false), {knows(truth), {}, {}}, plan);
+  const float deviation = 0.02f * plan.level;
+  flat::GateVerdict gate;
+  for (float& noise : gate.noise) noise = deviation * deviation / guide.consistency.noise;
+  const Buffer<flat::GateVerdict> gates(data.bins(), gate);
+  Buffer<float> colours(3 * data.bins(), 0.0f);
+  makeConsistent(frame.noisy, data, guide, gates, Buffer<uint8_t>(frame.noisy.pixels(), 0), plan.level, colours);
+  int bright = 0;
+  for (size_t p = 0; p < frame.noisy.pixels(); ++p) {
+    const size_t b = frame.noisy.offsets[p];
+    if (frame.noisy.count(p) != 1 || data.weight[b] < 0.99f) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      if (guide.flattened.get(kNames[c]).values[p] < plan.level) continue;
+      ++bright;
+      ASSERT_NEAR(colours[3 * b + c], 10 * deviation, 0.1f * deviation) << "pixel " << p;
+    }
+  }
+  EXPECT_GT(bright, 100);
 }
 
 TEST_F(Guided, NothingElseChangesAndComponentsAddUp) {

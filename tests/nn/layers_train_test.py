@@ -5,7 +5,9 @@ import csv
 import sys
 import tempfile
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 try:
     import numpy as np
@@ -277,6 +279,20 @@ class Data(unittest.TestCase):
         self.assertIn("fur/view0", (self.folder / "layers.md").read_text())
         evaluate_layers.main([str(self.folder / "layers.safetensors"), str(self.folder / "frames"), "--out", str(self.folder / "pictures")])
         self.assertEqual(len(list((self.folder / "pictures").glob("*.png"))), 3)
+
+
+class Ahead(unittest.TestCase):
+    def test_batches_are_those_of_their_step_and_of_the_frames_at_that_time(self):
+        training, frames = train_layers.Training.__new__(train_layers.Training), [0]
+        training.settings = SimpleNamespace(batch=4, validate=3)
+        training.batches = SimpleNamespace(batch=lambda step, count: (step, count, len(frames)))
+        training.beside, training.ahead = ThreadPoolExecutor(1), None
+        for training.step in range(9):
+            self.assertEqual(training.batch(), (training.step, 4, len(frames)))
+            if training.ahead:
+                training.ahead.result()
+            if (training.step + 1) % 3 == 0:
+                frames.append(0)
 
 
 class Loss(unittest.TestCase):

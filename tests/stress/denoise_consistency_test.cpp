@@ -98,8 +98,9 @@ TEST(StressConsistency, EqualsItsFormula) {
               const double moved =
                   std::max(value + std::clamp(v * w * change / all, -most, most), std::min(value, 0.0));
               ASSERT_TRUE(std::isfinite(found));
-              // The sums' rounding is that of their largest term.
-              worst = std::max(worst, std::fabs(double(found) - moved) / (sizes + 1e-3 * double(plan.level)));
+              // The sums' rounding is that of their largest term, and moves the bin as a change of the sum does.
+              const double gain = std::max(1.0, v * w / all);
+              worst = std::max(worst, std::fabs(double(found) - moved) / (gain * sizes + 1e-3 * double(plan.level)));
             }
           }
       }
