@@ -23,7 +23,7 @@ double errorOf(const flat::GateVerdict& gate, size_t c, double colour, const Con
 }
 
 TEST(StressConsistency, EqualsItsFormula) {
-  constexpr double kBound = 1e-4;
+  constexpr double kBound = 1e-5;
   double worst = 0;
   for (int round = 0; round < 4 * stress::rounds(); ++round)
     for (const auto& [width, height] : {std::pair{1, 1}, {1, 19}, {23, 1}, {18, 14}})
