@@ -11,6 +11,7 @@
 #include "deep/flatten.h"
 #include "deep/io.h"
 #include "flat/io.h"
+#include "tests/oidn/installed.h"
 #include "tests/reference/layered.h"
 #include "tests/reference/noisy_flat.h"
 #include "tests/reference/noisy_frame.h"
@@ -62,7 +63,7 @@ class LayersDenoise : public testing::Test {
         .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   }
   Ran fathom(const std::string& arguments) const {
-    return runFathom(arguments, "cd '" + folder_.path() + "'; FATHOM_OIDN_LIBRARY=/nowhere FATHOM_MODELS=models");
+    return runFathom(arguments, "cd '" + folder_.path() + "'; FATHOM_MODELS=models");
   }
   Ran run(const std::string& arguments) const { return fathom("denoise --method layers " + arguments); }
   void expectFine(const Ran& outcome) const { ASSERT_EQ(outcome.status, 0) << outcome.err; }
@@ -120,6 +121,10 @@ TEST_F(LayersDenoise, GuidesFramesOfFewSamplesByItself) {
   EXPECT_TRUE(std::ranges::equal(read("auto.exr").get("R"), read("layers.exr").get("R")));
   for (const char* more : {"--quality fast", "--error", "--flat-guide none", "--filter paper", "--memory 40M"})
     EXPECT_FALSE(guided(image, more)) << more;
+  // Where Open Image Denoise is found, it is taken: this one fails.
+  const Ran other = fathom("denoise some.exr -o oidn.exr --oidn-library " + reference::fakeOidn("fake_oidn_failing"));
+  EXPECT_EQ(other.status, 1);
+  EXPECT_THAT(other.err, Not(HasSubstr("layered network")));
   image.attributes.set("fathom:spp", 9);
   EXPECT_FALSE(guided(image));
   expectFine(fathom("denoise some.exr -o none.exr --flat-guide none"));

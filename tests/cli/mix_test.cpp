@@ -37,7 +37,7 @@ class MixCommand : public testing::Test {
         .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   }
   Ran fathom(const std::string& arguments) const {
-    return runFathom(arguments, "cd '" + folder_.path() + "'; FATHOM_OIDN_LIBRARY=/nowhere FATHOM_MODELS=models");
+    return runFathom(arguments, "cd '" + folder_.path() + "'; FATHOM_MODELS=models");
   }
   flat::Image read(const std::string& name) const { return flat::read(folder_ / name); }
   bool same(const std::string& a, const std::string& b, const std::string& plane) const {
